@@ -87,7 +87,7 @@ class Effect:
 
 
 def full_names(effect: str, parameter: str, per_tube: bool, n_tubes: int) -> tuple[str, ...]:
-    """One name, or one a tube."""
+    """The full name of a parameter, or one for each tube."""
     name = f"effects.{effect}.{parameter}"
     return tuple(f"{name}.{i + 1}" for i in range(n_tubes)) if per_tube else (name,)
 

@@ -139,7 +139,7 @@ def group_of(role: str) -> str:
 
 
 def grouped(units: dict[str, str]) -> dict[str, str]:
-    """Units of roles, as one of their group where it has only one."""
+    """The units of roles: that of their group where all roles of the group have one unit."""
     kinds: dict[str, set[str]] = {}
     for role, unit in units.items():
         kinds.setdefault(group_of(role), set()).add(unit)

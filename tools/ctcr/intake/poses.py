@@ -92,7 +92,7 @@ def unseen(pose: Pose) -> Mask:
 
 
 def inverse(pose: Pose) -> Pose:
-    """The tracker in the frame of the marker."""
+    """The pose of the tracker in the frame of the marker."""
     return Pose(*frames.inverse_pose(pose.position, pose.quaternion))
 
 

@@ -100,7 +100,7 @@ def shares_below(axes, sizes: Array, **style: Any) -> None:
 
 
 def noise_below(axes, sd: float, label: str) -> None:
-    """The same of noise alone, of this standard deviation along each axis [mm], beside what is drawn already."""
+    """The share of noise alone below each size, beside what is drawn; `sd` is that of each axis [mm]."""
     if sd > 0:
         reach = axes.get_xlim()[1]
         size = np.append(np.linspace(0, min(5 * sd, reach), 60), reach)

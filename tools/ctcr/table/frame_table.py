@@ -14,7 +14,7 @@ NAME = "DataFrame"  # in messages
 
 
 class FrameTable:
-    """As NumberTable. `frame` is a DataFrame of pandas, or one that has its `columns` and its columns by name."""
+    """A DataFrame with the interface of NumberTable: of pandas, or one with `columns` and its columns by name."""
 
     path, start = Path(NAME), 0
 

@@ -56,7 +56,7 @@ class BusSettings:
 
 
 def state_record(folder: Path, writer: bool = False) -> SharedRecord:
-    """STATE, written every cycle."""
+    """The shared record of STATE, which this process writes every cycle."""
     return SharedRecord(folder / "bus", STATE, writer)
 
 

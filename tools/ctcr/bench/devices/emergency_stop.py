@@ -37,7 +37,7 @@ def reason(folder: Path) -> str | None:
 
 
 def release(folder: Path) -> None:
-    """Raises InputError where the latch cannot be removed."""
+    """Permits motion again. Raises InputError where the latch cannot be removed."""
     with file_faults(_latch(folder), "remove"):
         _latch(folder).unlink(missing_ok=True)
 

@@ -80,7 +80,7 @@ class Motors(ProcessClient):
             raise emergency_stop.stop_fault(self._folder)
 
     def wait(self, meanwhile: Callable[[], object] = lambda: time.sleep(POLL_S)) -> None:
-        """Until the last request is done. Raises DeviceFault where the motors are stopped before."""
+        """Waits until the last request is done. Raises DeviceFault where the motors are stopped before."""
         while True:
             self.check()
             if self.state["done"] == self._number:

@@ -53,7 +53,7 @@ class Step:
 
 
 def steps_of(plan: Measurements, approach: Approach, limits: JointLimits, file: str) -> list[Step]:
-    """Raises InputError with every row that the limits forbid."""
+    """The steps of a plan. Raises InputError with every row that the limits forbid."""
     n = plan.beta.shape[1]
     shift = DIRECTIONS[approach.direction] * np.repeat([approach.translation, approach.rotation], n)
     steps = []
@@ -137,7 +137,7 @@ class Session:
         return rows
 
     def _approach(self, step: Step) -> list[Array]:
-        """Moves to the joints of a step; the row of its way point, where it has one."""
+        """Moves to the joints of a step. Returns the row of its way point, where it has one."""
         if not np.array_equal(step.force, self._force):
             self._announce(f"row {step.row}: weight")
             self.hang(step.force)

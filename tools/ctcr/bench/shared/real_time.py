@@ -67,7 +67,7 @@ class Lateness:
         self.worst = max(self.worst, late)
 
     def quantile(self, fraction: float) -> float:
-        """[s], rounded up to BIN_S; 0 before the first `add`."""
+        """The lateness [s] that this fraction stays below, rounded up to BIN_S; 0 before the first `add`."""
         total = int(self._counts.sum())
         return BIN_S * (1 + int(np.searchsorted(np.cumsum(self._counts), fraction * total))) if total else 0.0
 

@@ -53,5 +53,5 @@ class SharedRecord:
 
 
 def shared_motors(folder: Path, writer: bool = False) -> SharedRecord:
-    """MOTORS, translations then rotations: the simulated bus writes them, the simulated robot reads them."""
+    """The record of MOTORS, translations first: the simulated bus writes it, the simulated robot reads it."""
     return SharedRecord(folder / "motors", MOTORS, writer)

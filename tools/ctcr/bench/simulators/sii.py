@@ -29,7 +29,7 @@ class Identity(NamedTuple):
 
 
 def eeprom(identity: Identity, sync_managers: tuple[SyncManager, ...] = ()) -> bytes:
-    """The content; with sync managers the first two are the mailbox, and the terminal speaks CoE."""
+    """The content of the EEPROM. The first two sync managers are the mailbox of a terminal that speaks CoE."""
     head, general = bytearray(0x80), bytearray(32)
     struct.pack_into("<H", head, 0, 0x0C05 if sync_managers else 0x0104)
     struct.pack_into("<H", head, 14, _crc8(head[:14]))

@@ -92,7 +92,7 @@ class SlaveController:
         self.application.entered(State.INIT)
 
     def link(self, following: bool) -> None:
-        """Whether another terminal follows on the second port."""
+        """Notes whether another terminal follows on the second port."""
         self._put(_DL_STATUS, 0x5211 | (0x0820 if following else 0x0400))
 
     def _put(self, address: int, value: int) -> None:
@@ -104,7 +104,7 @@ class SlaveController:
     # ---- access from the bus
 
     def read(self, address: int, length: int) -> bytes | None:
-        """Memory; None where it cannot be read now."""
+        """A part of the memory; None where it cannot be read now."""
         end = address + length
         if end > len(self.memory):
             return None
@@ -121,7 +121,7 @@ class SlaveController:
         return data
 
     def write(self, address: int, data: bytes) -> bool:
-        """Whether the memory was written."""
+        """Writes memory and acts on it; whether that is possible."""
         end = address + len(data)
         if end > len(self.memory) or (_AL_STATUS <= address and end <= _AL_STATUS + 8):
             return False
