@@ -57,18 +57,11 @@ def from_matrices(matrices: Array, rows: Integers, name: str, faults: Faults) ->
     known = np.isfinite(matrices).all(axis=(1, 2)) & (np.abs(matrices).max(axis=(1, 2)) > 0)
     tested = np.where(known[:, None, None], matrices, np.eye(3))
     error = off_rotation(tested)
-    mirrored = np.linalg.det(tested) < 0
-    faults.where(
-        error > ORTHOGONAL_SLACK,
-        rows,
-        name,
-        "orthogonal",
-        lambda i: f"no rotation matrix: R R^T is off by {error[i]:.2g}",
-    )
-    faults.where(
-        mirrored & (error <= ORTHOGONAL_SLACK), rows, name, "mirrored", lambda _: "a reflection, not a rotation"
-    )
-    good = known & (error <= ORTHOGONAL_SLACK) & ~mirrored
+    off = error > ORTHOGONAL_SLACK
+    mirrored = ~off & (np.linalg.det(tested) < 0)
+    faults.where(off, rows, name, "orthogonal", lambda i: f"no rotation matrix: R R^T is off by {error[i]:.2g}")
+    faults.where(mirrored, rows, name, "mirrored", lambda _: "a reflection, not a rotation")
+    good = known & ~off & ~mirrored
     made = np.full((len(matrices), 4), np.nan)
     if good.any():
         made[good] = np.roll(Rotation.from_matrix(matrices[good]).as_quat(), 1, axis=1)
