@@ -64,17 +64,9 @@ def convert(log: Log, choices: Choices, robot: Robot | None = None, joints: Log 
     poses = (None, None) if pose is None else (pose.position, pose.quaternion)
     position, quaternion = (None if part is None else part[kept] for part in poses)
     _check_values(columns, moving, moved, position, quaternion)
-    table = Measurements(
-        moved.t,
-        moved.run.astype(np.int64),
-        moved.beta,
-        moved.alpha,
-        moved.force,
-        position,
-        quaternion,
-        moved.rows,
-        warnings=[*_doubts(columns, moved), *moving.doubts],
-    )
+    driven = moved.t, moved.run.astype(np.int64), moved.beta, moved.alpha, moved.force
+    warnings = [*_doubts(columns, moved), *moving.doubts]
+    table = Measurements(*driven, position, quaternion, moved.rows, warnings=warnings)
     columns.notes += _idle(columns, moving, pose)
     if not columns.has("t"):
         columns.notes.append("no column of times: effects of speed and delay cannot be found")

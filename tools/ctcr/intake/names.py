@@ -30,10 +30,8 @@ _WORDS |= dict.fromkeys(_set("i in inner innermost innen"), INNER) | dict.fromke
 _WORDS |= dict.fromkeys(_set("o out outer outermost aussen"), OUTER)
 _SEEN = _set("ok valid visible tracked seen state status visibility isvalid validity")
 _COMMANDED = _set("cmd command commanded des desired target goal setpoint set demand demanded sp nominal planned ideal")
-_COMMANDED |= _set(
-    "pred predicted prediction model sim simulated simulation calc calculated computed theory theoretical"
-)
-_COMMANDED |= _set("fk soll")
+_COMMANDED |= _set("pred predicted prediction model sim simulated simulation calc calculated computed")
+_COMMANDED |= _set("theory theoretical fk soll")
 _GIVEN = 100  # rank of a column that a command, a target or a model gives
 _MEASURED = _set("meas measured actual act fb feedback enc encoder real exp true gt ist")
 _ROTATION = _set("rot rotation orientation ori orient quat quaternion q euler attitude angle rpy rotvec rvec rodrigues")
@@ -49,17 +47,9 @@ _NOISE = _set("field pose pos position positions data log msg joint joints tube 
 _NOISE |= _set("coordinate coord p translation header of vector xyz is tracking mean avg") | _ROTATION
 _ELSE = _set("vel velocity speed rate acc acceleration current voltage torque temperature temp error err std sd var")
 _ELSE |= _set("variance cov covariance rms residual quality")
-_REMARKS = (
-    _set("base reference left right x y z w utc gmt local unix epoch")
-    | TIP_WORDS
-    | _TIME
-    | RUN
-    | _BETA
-    | _ALPHA
-    | _SEEN
-    | _COMMANDED
-)
-_REMARKS |= _MEASURED | _FORCE | _WEIGHT | _NOISE | {*_WORDS, *_EULER}  # in brackets they are no units
+_REMARKS = _set("base reference left right x y z w utc gmt local unix epoch")  # in brackets they are no units
+_REMARKS |= TIP_WORDS.union(_TIME, RUN, _BETA, _ALPHA, _SEEN, _COMMANDED, _MEASURED, _FORCE, _WEIGHT, _NOISE)
+_REMARKS |= {*_WORDS, *_EULER}
 _RATE = re.compile(r"([^\W\d_]+)\s*/\s*(?:s|sec|min|h)[\W\d]*$")  # such as mm/s: neither a joint nor a pose
 _AXIS = re.compile(r"[tp]?[xyz]|q[xyzw]|[rfw][xyz]")
 
