@@ -26,9 +26,8 @@ UNCERTAINTY = {
 }
 SAID = {
     "actuation": "not given: the ratios of the motors are not known, at home all tips are flush with the front plate",
-    "tracker": f"not given: the sensor is at the tip of tube 1, turned anyhow, tracker and base frame agree, and the "
-    "jitter is "
-    f"{TRACKER['jitter_mm']:g} mm and {TRACKER['jitter_deg']:g} deg",
+    "tracker": "not given: the sensor is at the tip of tube 1, turned anyhow, tracker and base frame agree, and the "
+    f"jitter is {TRACKER['jitter_mm']:g} mm and {TRACKER['jitter_deg']:g} deg",
     "uncertainty": f"not given: {UNCERTAINTY['tracker_frame_mm']:g} mm of the tracker frame, "
     f"{UNCERTAINTY['rotation_offset_deg']:g} deg of the homes, {UNCERTAINTY['curvature_percent']:g} % of curvatures "
     "and so on, as `ctcr init` writes",

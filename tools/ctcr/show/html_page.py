@@ -88,14 +88,11 @@ def paragraph(text: str, kind: str = "", bold: str = "") -> str:
 
 def cards(numbers: Iterable[tuple[str, str, str]]) -> str:
     """Large numbers side by side: (kind, value, meaning)."""
-    return (
-        '<div class="numbers">'
-        + "".join(
-            f'<div class="number {kind}"><b>{as_html(value)}</b><span>{as_html(text)}</span></div>'
-            for kind, value, text in numbers
-        )
-        + "</div>"
+    shown = "".join(
+        f'<div class="number {kind}"><b>{as_html(value)}</b><span>{as_html(text)}</span></div>'
+        for kind, value, text in numbers
     )
+    return f'<div class="numbers">{shown}</div>'
 
 
 def bullets(lines: Iterable[str]) -> str:
