@@ -36,13 +36,12 @@ def start(robot: Robot, readings: Measurements) -> float:
     distance = np.linalg.norm(readings.position - tip, axis=1)
     usual, longest = float(np.nanmedian(distance)), robot.tubes[0].length
     if usual > longest:
-        raise InputError(
-            Problem(
-                f"the measured tips lie {1e3 * usual:.0f} mm from those predicted, more than the robot is long: the "
-                f"tracker frame (tracker.position_mm, rotation_vector_rad) or its unit is wrong; find it with "
-                f"`ctcr calibrate frame`"
-            )
+        text = (
+            f"the measured tips lie {1e3 * usual:.0f} mm from those predicted, more than the robot is long: the "
+            "tracker frame (tracker.position_mm, rotation_vector_rad) or its unit is wrong; find it with "
+            "`ctcr calibrate frame`"
         )
+        raise InputError(Problem(text))
     return max(float(np.sqrt(np.nanmean(np.sum(answer.position[answer.solved, :2] ** 2, axis=1)))), 1e-3)
 
 

@@ -184,9 +184,8 @@ def calibrate(
     robot, readings, notices = sensor_pose.usable(robot, readings)
     names = told(sensor_pose.with_pose(free, robot), readings)
     if not names:
-        raise InputError(
-            Problem("the frames of the runs are fitted by themselves: name other parameters in --free too")
-        )
+        text = "the frames of the runs are fitted by themselves: name other parameters in --free too"
+        raise InputError(Problem(text))
     lever = checks.start(robot, readings)
     usable, repeated = checks.usable_rows(readings)
     frame = [name for name in names if name.startswith("tracker.")]

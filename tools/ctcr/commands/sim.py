@@ -67,9 +67,8 @@ def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
     if not interface:
         make_cable()
     simulator = EthercatSimulator(interface or BUS, folder, motors, variant, scenario, seed)
-    serve(
-        simulator, lambda: options.Output().say(f"bus on {interface}" if interface else f"bus: drive it from {MASTER}")
-    )
+    said = f"bus on {interface}" if interface else f"bus: drive it from {MASTER}"
+    serve(simulator, lambda: options.Output().say(said))
 
 
 @command.command(name="bench", context_settings={"ignore_unknown_options": True})

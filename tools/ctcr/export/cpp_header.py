@@ -106,9 +106,8 @@ def _check(robot: Robot, namespace: str) -> None:
     names = namespace.split("::")
     possible = all(re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) and name not in TAKEN for name in names)
     if not possible or names[0] in ("std", "ctcr"):
-        problems.append(
-            Problem("is no free name in C++: use letters, digits and _", field=f"namespace {visible(namespace)}")
-        )
+        text = "is no free name in C++: use letters, digits and _"
+        problems.append(Problem(text, field=f"namespace {visible(namespace)}"))
     if problems:
         raise InputError(problems)
 

@@ -51,10 +51,9 @@ def read(path: Path, content: bytes) -> Log:
     count = Counter(len(fields) for fields in sample if fields).most_common(1)[0][0]  # the usual one
     names = _names(head, start, count)
     if delimiter == "," and (halves := _halves(head, start, count)):
-        text = f"has {count} fields a row and {halves} names: between commas, decimal commas cannot be told"
-        raise InputError(
-            Problem(f"{text}: export it with decimal points, or separated by semicolons or tabs", str(path))
-        )
+        text = f"has {count} fields a row and {halves} names: between commas, decimal commas cannot be told: "
+        text += "export it with decimal points, or separated by semicolons or tabs"
+        raise InputError(Problem(text, str(path)))
     notes += [f"line 1 to {first - 1}: no table; passed over"] * (names[0] == "#1" and first > 1)
     regular = _regular(lines, first, delimiter, len(names))
     rows = [] if regular else _split(path, lines, delimiter)

@@ -58,9 +58,8 @@ def at(columns: Columns, moving: Columns, moved: Motion, t: Array, zero: float) 
         raise InputError(Problem(f"{text} (not used: {unused})", str(lacking.log.path)))
     known = moved.only(complete(moving, moved) & np.isfinite(moved.t))
     if (np.diff(known.t) < 0).any():
-        raise InputError(
-            Problem("its times run backwards: joints cannot be found by time", file, field=moving.name("t"))
-        )
+        text = "its times run backwards: joints cannot be found by time"
+        raise InputError(Problem(text, file, field=moving.name("t")))
     clock = t + (zero - moved.zero)  # of the poses, by the clock of the joints
     inside = (clock >= known.t[0]) & (clock <= known.t[-1])
     if not inside.any():

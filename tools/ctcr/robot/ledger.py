@@ -66,9 +66,8 @@ def write(
     """
     source = robot._source
     if source and not in_place and os.path.realpath(target) == os.path.realpath(source.file):
-        raise InputError(
-            Problem("is the input: choose another name, or permit the change (--in-place; in_place=True)", str(target))
-        )
+        text = "is the input: choose another name, or permit the change (--in-place; in_place=True)"
+        raise InputError(Problem(text, str(target)))
     updated = changed(robot, changes, entry, effects=effects, file=str(target))
     with _unchanged(source) if source and in_place else nullcontext(), atomic_writer(target) as file:
         file.write(updated._source.text)
