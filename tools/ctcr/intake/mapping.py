@@ -114,13 +114,9 @@ def _explicit(choices: Choices, picker: _Picker) -> dict[str, Used]:
         if i is not None:
             found = log.meanings.get(log.names[i])
             unit = found.unit if found else names.unit(log.names[i])
-            fits = unit and unit.quantity in ("", names.quantity(_plain(role)))
+            fits = unit and unit.quantity in ("", names.quantity(role.removeprefix("ref_")))
             made[role] = Used(i, log.names[i], unit if fits else None, "option")
     return made
-
-
-def _plain(role: str) -> str:
-    return role.removeprefix("ref_")
 
 
 def _joints(candidates, explicit, choices: Choices, n_tubes: int | None, picker) -> tuple[dict[str, Used], int]:
@@ -277,7 +273,7 @@ def _check_units(made: Mapping, choices: Choices, picker: _Picker) -> None:
     """Faults where a name states a unit of no known size, and where a weight has none: it may be in g, kg or N."""
     silent: dict[tuple[str, str], list[str]] = {}
     for role, used in made.used.items():
-        group, unit = group_of(_plain(role)), used.unit
+        group, unit = group_of(role.removeprefix("ref_")), used.unit
         is_clock = role == "t" and is_text(picker.log, used.column)
         if {role, group} & set(choices.units) or is_clock or (unit.quantity if unit else role != "weight"):
             continue
