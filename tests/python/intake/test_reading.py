@@ -273,6 +273,8 @@ def test_constant_joint(truth, log, imported, refused):
     assert "--constant beta2=0mm" in refused(path)
     table, _ = imported(path, "--constant", "beta2=-12mm")
     np.testing.assert_allclose(table.beta[:, 1], -0.012)
+    still = ["--constant", "beta2=0mm", "--offset", "alpha=0deg", "--offset", "t=0s"]
+    assert not imported(path, *still)[0].beta[:, 1].any()
 
 
 def test_mapping_for_the_next_log(truth, log, imported, same, tmp_path):
@@ -343,7 +345,9 @@ def test_faulty_mapping(log, lines, refused, tmp_path, content, words):
         (["--flip", "x"], "--mirror x"),
         (["--column", "beta1=bta1"], "did you mean beta1"),
         (["--column", "beta9x=beta1"], "is not known"),
-        (["--offset", "alpha2=90"], "has no unit"),
+        (["--unit", "beta=0mm"], "makes all numbers 0"),
+        (["--offset", "alpha2=90"], "has no unit: write 90deg"),
+        (["--offset", "t=2"], "has no unit: write 2s"),
         (["--offset", "alpha2@7=90deg"], "no alpha2 in a run 7"),
         (["--flip", "alpha3"], "there are 2 tubes"),
         (["--euler", "ZY"], "sequence of axes"),

@@ -50,7 +50,7 @@ def convert(log: Log, choices: Choices, robot: Robot | None = None, joints: Log 
     moved = motion.of(moving, robot)
     pose = sensor.of(columns)
     t, zero = motion.times(columns) if beside else (moved.t, moved.zero)
-    shift = units.parsed(choices.offsets["t"], "time", "--offset t").size if "t" in choices.offsets else 0.0
+    shift = units.value(choices.offsets["t"], "time", "--offset t") if "t" in choices.offsets else 0.0
     columns.faults.raise_any()
     moving.faults.raise_any()
     if beside:

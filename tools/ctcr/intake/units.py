@@ -90,22 +90,27 @@ def parsed(text: str, quantity: str, where: str) -> Unit:
 
     Raises InputError that names the option `where` and the units of the quantity.
     """
-    found = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)?\s*(\S*?)\s*", text)
-    unit = named(found[2]) if found else None
-    try:
-        factor = float(found[1] or 1) if found else 0.0
-    except ValueError:
-        factor = 0.0
-    if unit is None or unit.quantity != quantity or factor == 0:
-        raise InputError(Problem(f"{text} is no unit of {quantity}: give one of {of(quantity)}", field=where))
-    return Unit(unit.text if found[1] is None else text.strip(), quantity, factor * unit.size)
+    unit = _amount(text, quantity, where)
+    if not unit.size:
+        raise InputError(Problem(f"{text} makes all numbers 0: give one of {of(quantity)}", field=where))
+    return unit
 
 
 def value(text: str, quantity: str, where: str) -> float:
-    """A quantity of an option, such as 90deg or -12mm, in SI units; a bare 0 needs no unit."""
+    """A quantity of an option, such as 90deg or -12mm, in SI units; a bare 0 needs no unit. Raises InputError."""
     try:
         if float(text) == 0:
             return 0.0
     except ValueError:
-        return parsed(text, quantity, where).size
-    raise InputError(Problem(f"{text} has no unit: write {text}{'mm' if quantity == 'length' else 'deg'}", field=where))
+        return _amount(text, quantity, where).size
+    usual = {"length": "mm", "angle": "deg"}.get(quantity, SI[quantity])
+    raise InputError(Problem(f"{text} has no unit: write {text}{usual}", field=where))
+
+
+def _amount(text: str, quantity: str, where: str) -> Unit:
+    """A unit with or without a number before it."""
+    found = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)?\s*(\S*?)\s*", text)
+    unit = named(found[2]) if found else None
+    if unit is None or unit.quantity != quantity:
+        raise InputError(Problem(f"{text} is no unit of {quantity}: give one of {of(quantity)}", field=where))
+    return Unit(text.strip(), quantity, float(found[1]) * unit.size) if found[1] else unit
