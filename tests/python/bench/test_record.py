@@ -19,7 +19,7 @@ from ctcr.bench.devices.person import Person
 from ctcr.bench.devices.tracker import Tracker
 from ctcr.bench.record.display import picture
 from ctcr.bench.record.folder import Folder
-from ctcr.bench.record.live_page import LivePage
+from ctcr.bench.record.live_page import SHOWN, LivePage, page
 from ctcr.bench.record.row_file import RowFile
 from ctcr.bench.record.session import Approach, Progress, Session, steps_of
 from ctcr.commands.options import with_effects
@@ -258,6 +258,12 @@ def test_live_page(tmp_path, monkeypatch):
     assert "A &lt;robot&gt;" in first and "row 4: moving" in first and "3.54 mm" in first
     assert second.count("<circle") == 3 and "5.00 mm" in second
     assert "refresh" not in target.read_text() and target.read_text().count("<circle") == 3
+
+
+def test_page_of_unknown_errors():
+    """Where the model has no solution there is no point, and no picture where that is so for all of its readings."""
+    shown = page(Progress(10, errors_mm=[0.1] + [np.nan] * SHOWN), "title", 2)
+    assert "<circle" not in shown and "not known" in shown and "nan mm" not in shown and "0.10 mm" in shown
 
 
 def test_picture():

@@ -64,9 +64,9 @@ class Display:
             lines.append(Text("the tracker does not see the sensor: waiting for it", style="bold red"))
         if errors:
             worst = max((e for e in errors if not isnan(e)), default=errors[-1])
-            figures = f"now {_mm(errors[-1])}, RMS {_mm(progress.rms_mm)}, worst {_mm(worst)}"
+            figures = f"now {in_mm(errors[-1])}, RMS {in_mm(progress.rms_mm)}, worst {in_mm(worst)}"
             lines.append(f"error against the model: {figures}")
-            lines.append(f"{picture(errors)}  newest right, full height {_mm(_top(errors))}")
+            lines.append(f"{picture(errors)}  newest right, full height {in_mm(_top(errors))}")
         return Group(*lines)
 
 
@@ -80,5 +80,6 @@ def _top(errors_mm: list[float]) -> float:
     return max((e for e in errors_mm[-WIDTH:] if not isnan(e)), default=1.0) or 1.0
 
 
-def _mm(value: float) -> str:
+def in_mm(value: float) -> str:
+    """An error as displays show it."""
     return "not known" if isnan(value) else f"{value:.2f} mm"

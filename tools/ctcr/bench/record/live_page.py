@@ -5,6 +5,7 @@ from contextlib import AbstractContextManager
 from math import isnan
 from pathlib import Path
 
+from ctcr.bench.record.display import in_mm
 from ctcr.bench.record.session import Progress
 from ctcr.show import html_page
 from ctcr.show.output import write_text
@@ -42,22 +43,28 @@ def page(progress: Progress, title: str, reload_s: int) -> str:
     numbers = [("good", f"{progress.done} of {progress.total}", "rows of the plan")]
     if known:
         numbers += [
-            ("good", f"{errors[-1]:.2f} mm", "error of the last reading"),
-            ("good", f"{progress.rms_mm:.2f} mm", "RMS error against the model"),
-            ("error", f"{max(known):.2f} mm", "largest error"),
+            ("good", in_mm(errors[-1]), "error of the last reading"),
+            ("good", in_mm(progress.rms_mm), "RMS error against the model"),
+            ("error", in_mm(max(known)), "largest error"),
         ]
     doing = progress.doing if progress.seen else f"{progress.doing}: the tracker does not see the sensor"
     sections = [
         html_page.paragraph(doing if reload_s else "ended", "lead"),
         html_page.cards(numbers),
-        picture(errors[-SHOWN:], len(errors)) if known else "",
+        picture(errors[-SHOWN:], len(errors)),
     ]
     return html_page.page(title, sections, reload_s=reload_s)
 
 
 def picture(errors_mm: list[float], count: int) -> str:
-    """The newest errors over the number of the reading, of `count`, as SVG; no point where one is not known."""
-    top = max(error for error in errors_mm if not isnan(error)) or 1.0
+    """The newest errors over the number of the reading, of `count`, as SVG; no point where one is not known.
+
+    Nothing where none is known.
+    """
+    known = [error for error in errors_mm if not isnan(error)]
+    if not known:
+        return ""
+    top = max(known) or 1.0
     step = (WIDTH - LEFT) / max(1, len(errors_mm) - 1)
 
     def height(error: float) -> float:
