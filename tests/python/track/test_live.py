@@ -165,7 +165,12 @@ def test_one_tube(robot):
     hidden = robot.model_copy(
         update={"effects": {"backlash_rotation": {"play": [0.1, 0.2, 0.3]}, "delay": {"delay": 0.02}}}
     )
-    assert one_tube(hidden, 1).effects == {"backlash_rotation": {"play": [0.2]}, "delay": {"delay": 0.02}}
+    alone = one_tube(hidden, 1)
+    assert alone.effects == {"backlash_rotation": {"play": [0.2]}, "delay": {"delay": 0.02}}
+    scalar = alone.model_copy(update={"effects": {"friction": {"coefficient": 0.02}}})  # as a file of one tube may say
+    assert one_tube(scalar, 0).effects == {"friction": {"coefficient": [0.02]}}
+    with pytest.raises(InputError, match="needs 3 number"):
+        one_tube(robot.with_effects(scalar.effects), 0)
 
 
 def test_one_by_one(robot, bench):

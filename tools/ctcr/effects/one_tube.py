@@ -7,14 +7,15 @@ from ctcr.robot.description import Robot
 def one_tube(robot: Robot, tube: int) -> Robot:
     """The robot whose tube of this index (0: innermost) alone stands out of the plate, with its effects.
 
-    The other tubes are straight behind the plate and do not act on it.
+    The other tubes are straight behind the plate and do not act on it. Raises InputError as `catalogue.value_of`.
     """
     actuation = {
         name: [value[tube]] if isinstance(value, list) else value for name, value in vars(robot.actuation).items()
     }
+    values = catalogue.value_of(robot)
     own = {
         identity: {
-            p.name: [given[p.name][tube]] if p.per_tube else given[p.name]
+            p.name: [values[p.full_names[tube]]] if p.per_tube else values[p.full_names[0]]
             for p in catalogue.get(identity, robot.n_tubes).parameters
             if p.name in given
         }
