@@ -103,6 +103,15 @@ def test_straight_move(seed):
     assert (np.abs(np.diff(rates, axis=0)) <= 1.01 * speeds / ramp * 1e-3 + 1e-9).all()
 
 
+@pytest.mark.parametrize("way", [5e-5, 5e-4, 0.5])
+def test_ramp_under_a_millisecond(way):
+    """It holds as it is: the joint goes forward to its end, in the time of a trapezoid or triangle."""
+    move = StraightMove([0.0], [way], [1.0], 1e-4)
+    assert move.duration == pytest.approx(way + 1e-4 if way > 1e-4 else 2e-4 * (way / 1e-4) ** 0.5)
+    places = [0.0, *(move.advance(move.duration / 100)[0][0] for _ in range(101))]
+    assert (np.diff(places) >= 0).all() and places[-1] == pytest.approx(way)
+
+
 def test_move_of_no_length():
     """It stays where it is."""
     move = StraightMove(HOME, HOME, np.ones(6), 0.2)

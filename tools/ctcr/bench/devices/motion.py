@@ -15,10 +15,8 @@ class StraightMove:
         """`speeds` (K,): highest of each joint [1/s], reached after `ramp_s`."""
         self._start, self._way = np.array(start, float), np.subtract(end, start)
         cruise = float((np.abs(self._way) / np.asarray(speeds, float)).max())  # [s] at full speed
-        self._ramp = max(ramp_s, 1e-3)
-        if cruise < self._ramp:  # full speed is never reached: a triangle with the same acceleration
-            self._ramp = (cruise * self._ramp) ** 0.5
-        self.duration = cruise + ramp_s if cruise >= ramp_s else 2 * self._ramp
+        self._ramp = min(ramp_s, (cruise * ramp_s) ** 0.5)  # shorter: full speed is never reached, a triangle as steep
+        self.duration = max(cruise, self._ramp) + self._ramp
         self._peak = 1 / (self.duration - self._ramp) if cruise else 0.0  # of the fraction of the way [1/s]
         self._t = 0.0
 
