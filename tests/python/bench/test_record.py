@@ -108,6 +108,23 @@ def test_foreign_table(tmp_path):
     assert path.read_text() == "a,b\n1,2\n"
 
 
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        (b"late" + b",0" * 15, "row 2, t_s: 'late' is not a number"),
+        (b"nan" + b",0" * 15, "row 2, t_s: 'nan' is not a number"),
+        (b"1,\xff" + b",0" * 14, "row 2: is not text in UTF-8"),
+        (b"", "row 2: has 0 fields: the header has 16"),
+    ],
+)
+def test_damaged_last_row(tmp_path, row, words):
+    """It is named with what to do."""
+    path = Folder(tmp_path / "out", {}, {}, 2).path / "measurements.csv"
+    path.write_bytes(path.read_bytes() + row + b"\n")
+    with pytest.raises(InputError, match=f"measurements.csv, {words}: correct or remove it"):
+        Folder(tmp_path / "out", {}, {}, 2)
+
+
 def test_full_disk(tmp_path, monkeypatch):
     """No half of a group stays, and what was there before does."""
     path = tmp_path / "measurements.csv"

@@ -220,11 +220,14 @@ def test_person(tmp_path, monkeypatch, capfd):
     assert "Touch point B (CAD 60, -40, -20 mm) with the tip of the probe" in said
 
 
-def test_other_angles(robot, bench, tmp_path):
-    """A table with rows at other angles is not resumed."""
+@pytest.mark.parametrize(
+    ("last", "words"), [("1,90,1", "row 3: holds rows at other angles"), ("1,90,up", "row 3, direction: 'up' is not a")]
+)
+def test_other_angles(robot, bench, tmp_path, last, words):
+    """A table with rows at other angles, or with a damaged last one, is not resumed."""
     table = tmp_path / "circles.csv"
-    table.write_text(",".join(ROTATION_COLUMNS) + "\n1,180,1,0,0,0,0.03,8\n1,90,1,0,0,0,0.03,8\n")
-    with pytest.raises(InputError, match="row 3: holds rows at other angles"):
+    table.write_text(",".join(ROTATION_COLUMNS) + f"\n1,180,1,0,0,0,0.03,8\n{last},0,0,0,0.03,8\n")
+    with pytest.raises(InputError, match=words):
         rotation_table(table, robot, Desk(bench, tmp_path, None, print), Circles(np.deg2rad(60), 8))
 
 

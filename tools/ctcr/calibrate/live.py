@@ -168,7 +168,7 @@ class _Turner:
         if not rows.last:
             return
         place, job = divmod(rows.groups - 1, len(self.jobs))
-        number, motor, sign = (float(field) for field in rows.last[:3])
+        number, motor, sign = map(rows.last_number, ROTATION_COLUMNS[:3])
         if place < len(self.tubes):
             tube = self.tubes[place]
             angle, wanted = self.jobs[job]

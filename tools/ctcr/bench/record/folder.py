@@ -44,7 +44,7 @@ class Folder:
         else:
             self._check(contents, settings)
         self.rows = RowFile(self.path / TABLE, column_names(n_tubes), group, synced)
-        last = float(self.rows.last[0]) if self.rows.last else 0.0
+        last = self.rows.last_number("t_s") if self.rows.last else 0.0
         elapsed = max(time.time() - self.about["started_unix_s"], last + 1e-3)
         self._zero = time.monotonic() - (0.0 if is_new else elapsed)
 

@@ -4,10 +4,12 @@ import csv
 import io
 import os
 from collections.abc import Iterable, Sequence
+from math import isfinite, nan
 from pathlib import Path
 
-from ctcr.errors import InputError, Problem, file_faults
+from ctcr.errors import InputError, Problem, file_faults, shown
 
+MEND = "correct or remove it, or choose another name"
 Row = Iterable[float | str]
 
 
@@ -20,7 +22,7 @@ class RowFile:
         Not `synced`, a group survives the end of this process when `append` returns, and a power cut when `sync` does:
         for loops that cannot wait for a disk.
         """
-        self.path, self._synced = path, synced
+        self.path, self._columns, self._synced = path, columns, synced
         header = (",".join(columns) + "\n").encode()
         with file_faults(path, "write"):
             self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
@@ -31,13 +33,37 @@ class RowFile:
             whole = [line for line in content[len(header) :].splitlines(keepends=True) if line.endswith(b"\n")]
             self.groups = len(whole) // group
             whole = whole[: self.groups * group]
+            self._row = len(whole) + 1  # of the file, that of `last`
+            self.last: list[str] | None = self._fields(whole[-1]) if whole else None
             kept = header + b"".join(whole)
             if content != kept:  # the power was cut while a group was being written
                 os.ftruncate(self._file, 0)
                 os.pwrite(self._file, kept, 0)
             self._end = len(kept)
-            self.last: list[str] | None = next(csv.reader([whole[-1].decode()])) if whole else None
             os.fsync(self._file)
+
+    def _fields(self, line: bytes) -> list[str]:
+        try:
+            fields = next(csv.reader([line.decode()]))
+        except UnicodeDecodeError:
+            raise self._fault(f"is not text in UTF-8: {MEND}") from None
+        if len(fields) != len(self._columns):
+            raise self._fault(f"has {len(fields)} fields: the header has {len(self._columns)}: {MEND}")
+        return fields
+
+    def last_number(self, column: str) -> float:
+        """The number in a column of `last`. Raises InputError where it is none."""
+        text = self.last[self._columns.index(column)]
+        try:
+            number = float(text)
+        except ValueError:
+            number = nan
+        if not isfinite(number):
+            raise self._fault(f"{shown(text)} is not a number: {MEND}", column)
+        return number
+
+    def _fault(self, text: str, column: str | None = None) -> InputError:
+        return InputError(Problem(text, str(self.path), self._row, column, line_name="row"))
 
     def append(self, rows: list[Row]) -> None:
         """One group, in the order of the columns; NaN is an empty field. Raises InputError where the disk is full."""
