@@ -1,7 +1,7 @@
 """Control and calibration with devices; tests that need a running bench are in on_bench_live.py."""
 
 import io
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,8 +14,17 @@ from ctcr.bench.devices.motors import Motors
 from ctcr.bench.devices.person import Person
 from ctcr.bench.record.row_file import RowFile
 from ctcr.calibrate import tables
-from ctcr.calibrate.live import ROTATION_COLUMNS, Circles, Desk, _Turner, rotation_table, still_reading
-from ctcr.calibrate.procedures import ROTATION_OFFSETS, tracker_noise
+from ctcr.calibrate.live import (
+    POINT_COLUMNS,
+    ROTATION_COLUMNS,
+    Circles,
+    Desk,
+    _Turner,
+    point_table,
+    rotation_table,
+    still_reading,
+)
+from ctcr.calibrate.procedures import CAD_POINTS, ROTATION_OFFSETS, tracker_noise
 from ctcr.calibrate.tables import Column
 from ctcr.effects.one_tube import one_tube
 from ctcr.errors import InputError
@@ -207,6 +216,24 @@ def test_tube_not_retractable(robot, bench, tmp_path):
         rotation_table(tmp_path / "circles.csv", robot, desk, Circles(0.3, 8))
     assert len(caught.value.problems) == 2  # tubes 2 and 3
     assert "tube 2 cannot stand out alone: beta1 = -463.00 mm: may be -450.00 to" in str(caught.value)
+
+
+def test_tube_not_rotatable(robot, bench, tmp_path):
+    """Limits that leave no angle to turn to are an error, before any motion."""
+    bench.limits.rotation_deg[1] = [-5.0, 5.0]
+    with pytest.raises(InputError, match="rotation_deg: .* common range of more than 20 deg"):
+        rotation_table(tmp_path / "circles.csv", robot, Desk(bench, tmp_path, None, print), Circles(0.3, 8))
+
+
+def test_other_points(bench, tmp_path):
+    """A table of the probe is resumed with its own points alone; where all are touched no device is needed."""
+    table, touched = tmp_path / "points.csv", "A,0,0,0,1,2,3,0.03,8\nB,60,-40,-20.1,1,2,3,0.03,8\n"
+    table.write_text(",".join(POINT_COLUMNS) + "\n" + touched)
+    for name, z, words in (("B", -20.1, None), ("B", 20.1, "row 3: holds rows of other points"), ("C", -20.1, "other")):
+        (tmp_path / "cad.csv").write_text(f"point,cad_x_mm,cad_y_mm,cad_z_mm\nA,0,0,0\n{name},60,-40,{z}\n")
+        points = tables.read(tmp_path / "cad.csv", CAD_POINTS)
+        with pytest.raises(InputError, match=words) if words else nullcontext():
+            point_table(table, points, Desk(bench, tmp_path, None, print), 8, 1)
 
 
 def test_person(tmp_path, monkeypatch, capfd):

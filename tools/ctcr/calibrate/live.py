@@ -83,7 +83,8 @@ def rotation_table(path: str | Path, robot: Robot, desk: Desk, circles: Circles)
 def point_table(path: str | Path, points: Table, desk: Desk, frames: int, rounds: int) -> None:
     """Has each named point touched with the probe, in `rounds` rounds; a row a touch.
 
-    `points`: a table of CAD_POINTS. Raises DeviceFault where the tracker stops.
+    `points`: a table of CAD_POINTS. Raises InputError where the rows that are there are of other points, DeviceFault
+    where the tracker stops.
     """
     names = list(dict.fromkeys(points["point"]))
     first = [points["point"].index(name) for name in names]
@@ -93,6 +94,12 @@ def point_table(path: str | Path, points: Table, desk: Desk, frames: int, rounds
     probe = section.model_copy(update={"tool": section.probe or section.tool})
     bench = desk.bench.model_copy(update={"tracker": probe})
     with closing(RowFile(Path(path), POINT_COLUMNS)) as rows, Tracker(bench, desk.place, PATIENCE_S) as tracker:
+        if rows.last:
+            name, where = touches[(rows.groups - 1) % len(names)]
+            touched = [rows.last_number(column) for column in POINT_COLUMNS[1:4]]
+            if rows.last[0] != name or not np.allclose(touched, 1e3 * where):
+                text = "holds rows of other points: choose another name, or the points of those rows"
+                raise InputError(Problem(text, str(rows.path), rows.groups + 1, line_name="row"))
         left = touches[rows.groups :]
         if left:
             tracker.connect()
@@ -146,16 +153,24 @@ class _Turner:
         self.jobs = self._jobs()
         self._worn: int | None = None  # the tube with the sensor on it
 
+    def _span(self) -> tuple[float, float]:
+        """First and last angle of a turn [rad], which all tubes may reach."""
+        low, high = self._limits.rotation[:, 0].max() + RUN_UP, self._limits.rotation[:, 1].min() - RUN_UP
+        return max(low, -np.pi), min(high, np.pi)
+
     def _jobs(self) -> list[tuple[float, int]]:
         """Angles [rad], each with the direction of approach: one turn forward, one backward."""
-        low, high = self._limits.rotation[:, 0].max() + RUN_UP, self._limits.rotation[:, 1].min() - RUN_UP
-        low, high = max(low, -np.pi), min(high, np.pi)
+        low, high = self._span()
         angles = np.linspace(low, high, 1 + max(2, round((high - low) / self._circles.step)))
         return [*((angle, 1) for angle in angles), *((angle, -1) for angle in angles[::-1])]
 
     def check(self) -> None:
-        """Raises InputError where a tube cannot stand out alone, or none is bent."""
+        """Raises InputError where a tube cannot stand out alone or turn, or none is bent."""
         problems = [] if self.tubes else [Problem("all are straight: there is no rotation to find", field="tubes")]
+        low, high = self._span()
+        if low >= high:
+            text = f"a turn begins {np.rad2deg(RUN_UP):g} deg before its first angle: all tubes need a common range of "
+            problems.append(Problem(f"{text}more than {np.rad2deg(2 * RUN_UP):g} deg", field="limits.rotation_deg"))
         for tube in self.tubes:
             if problem := self._limits.problem(self._alone(tube)):
                 text = f"tube {tube + 1} cannot stand out alone: {problem}; widen the limits, or take the tubes in the "
