@@ -197,7 +197,10 @@ def test_weights(limits, monkeypatch, loads, weight_left, asked):
     assert hung == asked
 
 
-@pytest.mark.parametrize("text", ["{", "[]", "{}", "3", '{"started_unix_s": null, "settings": {}, "sittings": []}'])
+@pytest.mark.parametrize(
+    "text",
+    ["{", "[]", "{}", "3", *(f'{{"started_unix_s": {t}, "settings": {{}}, "sittings": []}}' for t in ("null", '"1"'))],
+)
 def test_damaged_about(tmp_path, text):
     """A damaged session.json is named, and what was recorded stays."""
     Folder(tmp_path / "out", {}, {}, 3)

@@ -81,7 +81,8 @@ def test_attachments(recording, tmp_path):
 def test_no_recording(tmp_path):
     with pytest.raises(InputError, match="session.json: cannot read it"):
         write_mcap(tmp_path, tmp_path / "out.mcap")
-    (tmp_path / "session.json").write_text("{")
-    with pytest.raises(InputError, match="is this the folder of a recording"):
-        write_mcap(tmp_path, tmp_path / "out.mcap")
+    for text in ("{", "{}", '{"started_unix_s": NaN, "settings": {}, "sittings": []}'):
+        (tmp_path / "session.json").write_text(text)
+        with pytest.raises(InputError, match="session.json: does not describe a recording"):
+            write_mcap(tmp_path, tmp_path / "out.mcap")
     assert not (tmp_path / "out.mcap").exists()

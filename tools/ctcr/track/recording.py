@@ -10,8 +10,7 @@ import numpy as np
 
 from ctcr.arrays import Array
 from ctcr.bench.devices.fault import needed
-from ctcr.bench.record.folder import ABOUT, COPIES, TABLE, Folder
-from ctcr.errors import InputError, Problem, file_faults
+from ctcr.bench.record.folder import ABOUT, COPIES, TABLE, Folder, about_of
 from ctcr.frames import tracker_to_base
 from ctcr.robot import robot_file
 from ctcr.robot.description import Robot
@@ -86,12 +85,7 @@ def write_mcap(folder: str | Path, target: str | Path) -> dict[str, int]:
     """
     writer_of = needed("mcap", "mcap.writer", "export").Writer
     folder = Path(folder)
-    try:
-        with file_faults(folder / ABOUT, "read"):
-            about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
-    except ValueError:
-        raise InputError(Problem("is no JSON: is this the folder of a recording?", str(folder / ABOUT))) from None
-    start, counts = about["started_unix_s"], {}
+    start, counts = about_of(folder)["started_unix_s"], {}
     with atomic_writer(target, binary=True) as file:
         writer = writer_of(file)
         writer.start(profile="", library="ctcr")

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -110,7 +111,7 @@ class Folder:
         self.save()
 
     def _check(self, contents: dict[str, bytes], settings: dict[str, Any]) -> None:
-        self.about = _about(self.path / ABOUT)
+        self.about = about_of(self.path)
         changed = [name for name, content in contents.items() if _read(self.path / COPIES[name]) != content]
         before = self.about["settings"]
         differs = [f"another {COPIES[name]}" for name in changed]
@@ -136,13 +137,17 @@ def _interruptible() -> Iterator[None]:
         yield
 
 
-def _about(path: Path) -> dict[str, Any]:
+def about_of(folder: Path) -> dict[str, Any]:
+    """What the `session.json` of a recording says. Raises InputError where the folder holds none."""
     try:
-        about = json.loads(_read(path))
-        float(about["started_unix_s"]), dict(about["settings"]), list(about["sittings"])
+        about = json.loads(_read(folder / ABOUT))
+        dict(about["settings"]), list(about["sittings"])
+        is_whole = isfinite(about["started_unix_s"])
     except (ValueError, LookupError, TypeError):
-        text = "does not describe a recording: restore it, or choose another folder for the recording"
-        raise InputError(Problem(text, str(path))) from None
+        is_whole = False
+    if not is_whole:
+        text = "does not describe a recording: restore it, or choose another folder"
+        raise InputError(Problem(text, str(folder / ABOUT)))
     return about
 
 
