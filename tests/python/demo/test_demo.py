@@ -36,6 +36,10 @@ def test_joined():
         assert whole.run[n] == whole.run[n - 1] + 1 and len(np.unique(whole.run)) == 2 * len(np.unique(table.run))
         np.testing.assert_array_equal(whole.alpha, np.vstack([table.alpha] * 2))
         assert list(whole.row[[0, -1]]) == [2, 2 * n + 1]
+    timeless = replace(table, t=np.full(len(table), np.nan))
+    for before in ([timeless], [table, timeless]):
+        whole = joined([*before, table], [None] * (1 + len(before)))
+        np.testing.assert_allclose(np.diff(whole.t[-n:]), np.diff(table.t), atol=1e-9)
     without = replace(table, quaternion=None)
     assert joined([table, without], [None, None]).quaternion is None
 

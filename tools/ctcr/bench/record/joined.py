@@ -26,7 +26,7 @@ def joined(tables: Sequence[Measurements], starts: Sequence[float | None]) -> Me
         runs = number + np.unique(table.run, return_inverse=True)[1]
         rows = np.arange(row, row + len(table))
         moved.append(replace(table, t=table.t + shift, run=runs, row=rows))
-        end, number, row = float(np.nanmax(moved[-1].t)), int(runs.max()) + 1, row + len(table)
+        end, number, row = float(np.nanmax(moved[-1].t, initial=end)), int(runs.max()) + 1, row + len(table)
 
     def column(name: str):
         parts = [getattr(table, name) for table in moved]
