@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr.errors import InputError
-from ctcr.robot import ledger, robot_file
+from ctcr.robot import history, ledger, robot_file
 from ctcr.robot.ledger import Change, Entry
 
 ROOT = Path(__file__).parents[3]
@@ -137,6 +137,13 @@ def test_unknown_effect():
     with pytest.raises(InputError, match=r"line 68, effects.frction: unknown effect: did you mean friction\?"):
         robot_file.parse(text.encode())
     assert robot_file.parse(text.replace("frction", "friction").encode()).effects["friction"] == {"coefficient": 0.1}
+
+
+def test_expected_error_alone(robot):
+    """A ledger that holds no error but the expected one has no waterfall, and a page."""
+    entry = {"command": "mine", "figures": {"rms_mm": {"noise_floor": 0.5}}}
+    alone = robot.model_copy(update={"history": [entry]})
+    assert not history.waterfall(alone) and "mine" in history.page(alone)
 
 
 def test_robot_without_file(robot, tmp_path):

@@ -41,6 +41,7 @@ def waterfall(robot: Robot) -> list[Stage]:
     """Errors from the oldest entry that has them to the newest, and the expected error of the newest last.
 
     An entry begins with the error that the one before ended with, so that only the first gives that of the first file.
+    Empty where no entry has an error.
     """
     stages, floor = [], None
     for entry in robot.history:
@@ -55,7 +56,7 @@ def waterfall(robot: Robot) -> list[Stage]:
         elif any(stage.name == "calibrated" for stage in stages):
             found.pop("calibrated", None)
         stages += [Stage(name.removeprefix("with_").replace("_", " "), rms, source) for name, rms in found.items()]
-    return [*stages, floor] if floor else stages
+    return [*stages, floor] if stages and floor else stages
 
 
 def show(console, robot: Robot, lines: list[list[str]], stages: list[Stage]) -> None:
