@@ -56,10 +56,11 @@ def test_empty_fields(table):
             ["row 2, x_mm: is empty: needs a number in mm", "row 3, x_mm: 'two' is not a", "z_mm: is not finite"],
         ),
         (
-            "tube,direction,motor_angle_deg,x_mm,y_mm,z_mm\n0,2,1,2,3,4\n1.5,-1,1,2,3,4\n",
+            "tube,direction,motor_angle_deg,x_mm,y_mm,z_mm\n0,2,1,2,3,4\n1.5,-1,1,2,3,4\n1e300,1,1,2,3,4\n",
             [
                 "row 2, tube: '0' does not fit: needs a whole number from 1",
                 "row 3, tube: '1.5'",
+                "row 4, tube: '1e300'",
                 "row 2, direction: '2' does not fit: needs 1 or -1",
             ],
         ),

@@ -17,6 +17,7 @@ from ctcr.errors import InputError, Problem, did_you_mean, shown
 from ctcr.table.csv_table import Faults, header_names
 
 MAX_BYTES = 16 << 20
+MOST_COUNTED = 1e9  # tubes and readings are fewer
 
 UNITS = {
     "length": {"mm": 1e-3, "m": 1.0, "um": 1e-6},
@@ -150,7 +151,7 @@ def _values(column: Column, heading: str, texts: list[str], rows: Sequence[int],
 
 
 def _number(column: Column, text: str, needed: str, fault: Callable[[str, str], None]) -> float:
-    """The number of a field; fault(message, kind) is called where it is none, and where it does not fit."""
+    """The number of a field; NaN where it is none or does not fit, after fault(message, kind)."""
     try:
         value = float(text)
     except ValueError:
@@ -158,8 +159,10 @@ def _number(column: Column, text: str, needed: str, fault: Callable[[str, str], 
         return np.nan
     if not np.isfinite(value):
         fault(f"is not finite{needed}", "finite")
-    elif {"count": value < 1 or value != round(value), "sign": abs(value) != 1}.get(
+    elif {"count": not 1 <= value <= MOST_COUNTED or value != round(value), "sign": abs(value) != 1}.get(
         column.kind, column.positive and value <= 0
     ):
         fault(f"{shown(text)} does not fit{needed}", "kind")
-    return value
+    else:
+        return value
+    return np.nan
