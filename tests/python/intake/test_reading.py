@@ -355,6 +355,7 @@ def test_faulty_mapping(log, lines, refused, tmp_path, content, words):
         (["--translation", "from-flush"], "--robot"),
         (["--home-mm", "1,2,3", "--translation", "from-home"], "needs 2"),
         (["--home-mm", "1,2"], "needs --translation"),
+        (["--home-mm", "-300,inf", "--translation", "from-home"], "is not a list of finite numbers"),
         (["--unit", "alpha"], "NAME=VALUE"),
     ],
 )

@@ -31,7 +31,7 @@ def command(robot, bench_path, beta_mm, alpha_deg, home, at_home, speed, folder)
     loaded, bench, out = robot_file.load(robot), bench_file.load(bench_path), options.Output()
     n = loaded.n_tubes
     given = ("--beta-mm", beta_mm, 1e-3), ("--alpha-deg", alpha_deg, np.pi / 180)
-    wanted = [None if values is None else unit * options.finite(name, values, n) for name, values, unit in given]
+    wanted = [None if values is None else unit * options.array(name, values, n) for name, values, unit in given]
     with Motors(bench, loaded, folder) as motors:
         motors.connect()
         if home:

@@ -38,19 +38,19 @@ class File(click.ParamType):
 
 
 class Numbers(click.ParamType):
-    """Numbers separated by commas."""
+    """Finite numbers separated by commas."""
 
     name = "A,B,.."
 
     def convert(self, value, param, ctx) -> list[float]:
         try:
-            return [float(part) for part in value.split(",")]
-        except ValueError:
-            self.fail(f"{value!r} is not a list of numbers such as 90,0,-30", param, ctx)
+            return [Finite().convert(part, param, ctx) for part in value.split(",")]
+        except click.BadParameter:
+            self.fail(f"{value!r} is not a list of finite numbers such as 90,0,-30", param, ctx)
 
 
 def joints(required: bool):
-    """--beta-mm and --alpha-deg, as lists of numbers; see `finite`."""
+    """--beta-mm and --alpha-deg, as lists of numbers; see `array`."""
 
     def decorate(function):
         alpha = "Base angles [deg], innermost tube first."
@@ -61,14 +61,14 @@ def joints(required: bool):
     return decorate
 
 
-def finite(option: str, values: list[float], count: int):
-    """The numbers of an option as an array (count,). Raises InputError where there are others."""
+def array(option: str, values: list[float], count: int):
+    """The numbers of an option as an array (count,). Raises InputError where there are more or fewer."""
     import numpy as np
 
     from ctcr.errors import ArgumentError, Problem
 
-    if len(values) != count or not np.isfinite(values).all():
-        raise ArgumentError(Problem(f"needs {count} finite numbers, separated by commas", field=option))
+    if len(values) != count:
+        raise ArgumentError(Problem(f"needs {count} numbers, separated by commas", field=option))
     return np.array(values)
 
 

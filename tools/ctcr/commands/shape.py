@@ -34,9 +34,9 @@ def command(robot, beta_mm, alpha_deg, force, every, picture, steps, out) -> Non
     from ctcr.robot import robot_file
 
     loaded = robot_file.load(robot)
-    beta = _joints("beta", "--beta-mm", 1e-3 * options.finite("--beta-mm", beta_mm, loaded.n_tubes))
-    alpha = _joints("alpha", "--alpha-deg", np.deg2rad(options.finite("--alpha-deg", alpha_deg, loaded.n_tubes)))
-    force = options.finite("--force", force, 3)
+    beta = _joints("beta", "--beta-mm", 1e-3 * options.array("--beta-mm", beta_mm, loaded.n_tubes))
+    alpha = _joints("alpha", "--alpha-deg", np.deg2rad(options.array("--alpha-deg", alpha_deg, loaded.n_tubes)))
+    force = options.array("--force", force, 3)
     used = effect_model.without_the_path(loaded)
     model = Model(used, steps=steps)
     tip = model.predict(beta[None], alpha[None], force[None])
