@@ -99,6 +99,9 @@ def test_joints_between_their_rows(truth, log, imported, refused):
     np.testing.assert_allclose(moved.alpha[:, 0], [0.0, 0.75, 0.5, -0.5], atol=1e-12)
     late = log(text(["t", "x", "y", "z"], [times + 100, truth.position[:5]]))
     assert "--offset t=" in refused(late, "--joints", joint_log)
+    alpha[:, 1], beta[1:, 0], alpha[0, 0] = np.nan, np.nan, np.nan
+    partial = log(text(["t", *JOINTS[2:]], [t, beta, alpha]), "partial.csv")
+    assert "partial.csv: has no row with a time and all joints" in refused(poses, "--joints", partial)
 
 
 def test_one_log_without_times(truth, log, joints, imported, refused, tmp_path):

@@ -57,6 +57,8 @@ def at(columns: Columns, moving: Columns, moved: Motion, t: Array, zero: float) 
         unused = listed(lacking.unused, 30)
         raise InputError(Problem(f"{text} (not used: {unused})", str(lacking.log.path)))
     known = moved.only(complete(moving, moved) & np.isfinite(moved.t))
+    if not len(known.rows):
+        raise InputError(Problem("has no row with a time and all joints", file))
     if (np.diff(known.t) < 0).any():
         text = "its times run backwards: joints cannot be found by time"
         raise InputError(Problem(text, file, field=moving.name("t")))
