@@ -108,6 +108,16 @@ def test_fields_that_are_no_words(log, lines, refused, imported, same):
         assert words in error and "--missing" not in error
 
 
+def test_fields_of_several_lines(truth, log, refused, imported, same):
+    """A field that holds lines is judged alone: the decimal commas of its column stay numbers."""
+    content = text(NAMES, [truth.t, truth.beta, truth.alpha, truth.position], delimiter=";", decimal=",").split("\n")
+    before, beta, after = content[4].partition(content[4].split(";")[1])
+    content[4] = f'{before}"{beta}\n"{after}'
+    same(imported(log("\n".join(content)))[0], orientation=False)
+    content[4] = f'{before}"saturated\nat the end"{after}'
+    assert refused(log("\n".join(content))).count("is not a number") == 1
+
+
 def test_identity_and_states(truth, log, imported):
     """The identity at the origin is no reading; nor is one that a column of states calls invalid."""
     names = [*NAMES, "qw", "qx", "qy", "qz", "visible"]

@@ -39,10 +39,13 @@ def numbers(log: Log, column: int, words: Iterable[str], faults: Faults) -> Arra
 
 
 def _floats(log: Log, column: int, raw: list[str], words: Iterable[str], faults: Faults) -> Array:
-    texts = "\n".join(raw).replace("−", "-")
-    if log.decimal_comma:
-        texts = texts.replace(",", ".")
-    fields = texts.split("\n") if len(raw) == texts.count("\n") + 1 else raw
+    def pointed(text: str) -> str:
+        text = text.replace("−", "-")
+        return text.replace(",", ".") if log.decimal_comma else text
+
+    fields = pointed("\n".join(raw)).split("\n")  # at once: fast
+    if len(fields) != len(raw):  # some hold several lines
+        fields = [pointed(text) for text in raw]
     try:
         return np.fromiter(map(float, fields), float, count=len(fields))
     except ValueError:
@@ -59,7 +62,7 @@ def _floats(log: Log, column: int, raw: list[str], words: Iterable[str], faults:
 
 def _no_number(text: str) -> str:
     """Why a text is no number."""
-    digits, unit = re.fullmatch(r"\s*([-+\d.,]*)\s*(.*?)\s*", text).groups()
+    digits, unit = re.fullmatch(r"\s*([-+\d.,]*)\s*(.*?)\s*", text, re.DOTALL).groups()
     if text.strip()[:1] in ("[", "("):
         return "holds several numbers: give each a column of its own"
     if digits and named(unit):
