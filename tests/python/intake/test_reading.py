@@ -59,10 +59,22 @@ def test_lines_of_runs(log, lines, imported, same, refused):
     table, said = imported(log("\n".join(blocks)))
     same(table, orientation=False)
     assert np.bincount(table.run).tolist()[3:] == [12, 0, 0, 0, 12] and "row 16: names a run" in said
+    table, _ = imported(log("\n".join([*lines[:13], "Run 2", *lines[13:]])))
+    np.testing.assert_array_equal(table.run, np.repeat([1, 2], 12))
     named = [f"{line},{'run' if i == 0 else 5}" for i, line in enumerate(lines)]
     table, _ = imported(log("\n".join([*named[:13], "Run 2", *named[13:]])))
     assert set(table.run) == {5}
     assert "one such as Run 2 begins a run" in refused(log("\n".join([*lines[:13], "Block B", *lines[13:]])))
+
+
+@pytest.mark.parametrize("missing", ["", "NaN", "gone"])
+def test_row_without_run(log, lines, imported, missing):
+    """It is dropped, and the others keep the numbers of theirs."""
+    runs = ["run", *["5"] * 11, missing, *["7"] * 12]
+    rows = "\n".join(f"{line},{run}" for line, run in zip(lines, runs, strict=True))
+    table, said = imported(log(rows), "--missing", "gone")
+    np.testing.assert_array_equal(table.run, np.repeat([5, 7], [11, 12]))
+    assert "without run, 1 row (13): dropped" in said
 
 
 def test_names_in_columns(truth, log, imported, same):

@@ -106,11 +106,14 @@ def seen(log: Log, column: int) -> Mask:
     return np.array([_word(text) in SEEN_WORDS for text in raw])
 
 
-def labels(log: Log, column: int, faults: Faults) -> tuple[Array, list[str]]:
-    """Numbers of runs (M,); texts are numbered in their order, and returned in it."""
+def labels(log: Log, column: int, words: Iterable[str], faults: Faults) -> tuple[Array, list[str]]:
+    """Numbers of runs (M,), NaN where one is missing; texts are numbered in their order, and returned in it."""
     raw = log.values[column]
-    if isinstance(raw, np.ndarray) or all(_is_number(text, log.decimal_comma) for text in raw):
-        return numbers(log, column, (), faults), []
+    if isinstance(raw, np.ndarray):
+        return numbers(log, column, words, faults), []
+    filled = [text for text in raw if not _is_missing(text, words)]
+    if filled and all(_is_number(text, log.decimal_comma) for text in filled):
+        return numbers(log, column, words, faults), []
     texts = [text.strip() for text in raw]
     named_in_order = list(dict.fromkeys(texts))
     place = {text: float(i) for i, text in enumerate(named_in_order)}

@@ -203,7 +203,8 @@ def _add_to_runs(columns: Columns, run: Array, joints: dict[str, Array]) -> None
 def _runs(columns: Columns, t: Array) -> Array:
     if not columns.has("run"):
         return _runs_by_time(t, columns.notes)
-    run, texts = fields.labels(columns.log, columns.mapping.used["run"].column, columns.faults)
+    column, words = columns.mapping.used["run"].column, columns.choices.missing
+    run, texts = fields.labels(columns.log, column, words, columns.faults)
     if texts:
         columns.notes.append("runs: " + listed([f"{i} = {text or '(empty)'}" for i, text in enumerate(texts)]))
     return run

@@ -270,7 +270,7 @@ def _runs(rows: Rows, numbers: Integers) -> list[str]:
     begins = {number: run for number, fields in rows if (run := _number_of_run(fields))}
     if not begins or max(begins) < numbers[0]:
         return []
-    runs = ["", *begins.values()]  # "": of rows above the first such line
+    runs = [str(min(map(int, begins.values())) - 1), *begins.values()]  # the first: of rows above these lines
     return [runs[i] for i in np.searchsorted([*begins], numbers)]
 
 
