@@ -46,17 +46,18 @@ def start(robot: Robot, readings: Measurements) -> float:
 
 
 def usable_rows(readings: Measurements) -> tuple[Mask, list[str]]:
-    """Rows that say something new, and what to say about the others."""
+    """Rows that are no copies of earlier readings, and what to say about the others."""
     columns = [readings.t[:, None], readings.run[:, None], readings.beta, readings.alpha, readings.force]
     columns += [part for part in (readings.position, readings.quaternion) if part is not None]
     content = np.nan_to_num(np.hstack(columns), nan=1e300)
     _, first = np.unique(content, axis=0, return_index=True)
-    usable = np.zeros(len(readings), bool)
-    usable[first] = True
-    if usable.all():
-        return usable, []
-    repeated = readings.row[~usable]
-    return usable, [f"{_rows(repeated)} repeat earlier rows exactly and are left out: they are no new measurements."]
+    copies = readings.measured.copy()
+    copies[first] = False
+    if not copies.any():
+        return ~copies, []
+    verb = "repeats" if copies.sum() == 1 else "repeat"
+    text = f"{_rows(readings.row[copies])} {verb} earlier rows exactly, no new measurements, and left out."
+    return ~copies, [text]
 
 
 def of_sensor(robot: Robot, fit: Fit) -> list[str]:

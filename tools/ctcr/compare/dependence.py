@@ -169,7 +169,8 @@ def all_forms(
         for name, label, frame, design in special
     ]
     for item in items:
-        for design in replace(item, value=item.value[rows]).bases():
+        chosen = replace(item, value=item.value[rows])
+        for design in chosen.bases() if chosen.varies else []:
             regression = Regression(np.hstack([ones, np.nan_to_num(design)]), folds)
             forms += [Form(item.name, item.label, f, frames[f], regression, item) for f in ("base", "tip", "axis")]
     return forms

@@ -307,7 +307,7 @@ class Refits:
             if not _is_always_touched(engine, fit, candidate):
                 break
         else:
-            return replace(one, fit=None)
+            return replace(one, fit=None, refit=None)
         return self._by(one, fit)
 
     def _by(self, one: CandidateFit, fit: joint.Fit) -> CandidateFit:
