@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from ctcr.intake.log import distinct
 from ctcr.table import measurements
 from lab_logs import text
 from scipy.io import savemat
@@ -52,6 +53,18 @@ def test_ndi_toolbox(truth, log, joints, imported, rotation):
     np.testing.assert_allclose(table.alpha, truth.alpha, atol=1e-9)
     np.testing.assert_array_equal(table.run, truth.run)
     assert "NDI ToolBox" in said and "1 row (5)" in said
+
+
+def test_names_that_come_again(truth, log, joints, imported):
+    """A column whose name comes again has a name of its own, also where another column has the name that it would get:
+    all later columns keep their places."""
+    lines = [line.split(",") for line in ndi(truth, "quaternion").split("\n")[:-1]]
+    for taken in ("Face (2)", "Face (#7)"):
+        more = [[taken, "Face"], *[["8", "9"]] * 24]
+        wider = [",".join([*line[:5], *two, *line[5:]]) for line, two in zip(lines, more, strict=True)]
+        table, _ = imported(log("\n".join(wider)), "--joints", joints, "--sensor", "tip")
+        np.testing.assert_allclose(table.position[4:], truth.position[4:], atol=1e-9)
+    assert distinct(["x", "x", "x (2)", "x"]) == ["x", "x (3)", "x (2)", "x (4)"]
 
 
 def test_ndi_needs_joints_and_a_tool(truth, log, joints, refused):

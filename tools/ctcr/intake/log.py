@@ -1,7 +1,9 @@
 """A log as its file holds it: named columns of text or numbers, with the row of the file that each value came from."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 
 from ctcr.arrays import Array, Integers
@@ -9,6 +11,17 @@ from ctcr.errors import InputError, Problem, suggestion
 from ctcr.intake.names import Meaning
 
 _WITH_UNIT = re.compile(r" \[[^][]*\]$")  # as the reader appends the unit of a row below the header
+
+
+def distinct(names: Sequence[str]) -> list[str]:
+    """The names, where one comes again with a number that makes it a name of its own: x, x (2)."""
+    taken, made = {*names}, {}
+    for name in names:
+        if name in made:
+            name = next(other for i in count(2) if (other := f"{name} ({i})") not in taken)
+            taken.add(name)
+        made[name] = None
+    return list(made)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ctcr.errors import InputError, Problem
-from ctcr.intake.log import Log
+from ctcr.intake.log import Log, distinct
 from ctcr.intake.names import Meaning
 from ctcr.intake.units import Unit, named
 
@@ -55,15 +55,14 @@ def _ndi(path: Path, rows: Rows) -> Log:
     """A group of columns a tool: its port and name, Frame, State, rotation, translation; then its single markers."""
     above = next(i for i, (_, fields) in enumerate(rows) if any(fields))
     header = [name.strip() for name in rows[above][1]]
-    meanings, marker, single = {}, "", False
-    for i, name in enumerate(header):
+    columns, marker, single = [], "", False
+    for name in header:
         if name.startswith("Port"):
             marker, single = re.sub(r"\s+", " ", name), False
         label = f"{marker}: {name}" if marker and name != marker else name
-        label = f"{label} (#{i + 1})" if label in meanings else label
-        meanings[label] = None if single else _ndi_meaning(name, marker)
+        columns.append((label, None if single else _ndi_meaning(name, marker)))
         single = single or name == "Markers"
-    return _log(path, "NDI ToolBox", meanings, rows[above + 1 :], "ZYX", [])
+    return _log(path, "NDI ToolBox", columns, rows[above + 1 :], "ZYX", [])
 
 
 def _ndi_meaning(name: str, marker: str) -> Meaning | None:
@@ -89,14 +88,13 @@ def _motive(path: Path, rows: Rows) -> Log:
     types, bodies, properties = (_wide(fields, len(axes)) for fields in (above[0], above[1], above[-1]))
     wanted = "Rigid Body" if "Rigid Body" in types else "Bone" if "Bone" in types else "Marker"
     euler = about.get("Rotation Type", "Quaternion").strip()
-    meanings = {}
+    columns = []
     for i, axis in enumerate(axis.strip() for axis in axes):
         name = " ".join(part for part in (bodies[i], properties[i], axis) if part) or f"#{i + 1}"
-        name = f"{name} (#{i + 1})" if name in meanings else name
         is_used = i < 2 or types[i] == wanted
-        meanings[name] = _motive_meaning(axis, properties[i], bodies[i], length) if is_used else None
+        columns.append((name, _motive_meaning(axis, properties[i], bodies[i], length) if is_used else None))
     notes = [f"recording started at {about['Capture Start Time']}"] if about.get("Capture Start Time") else []
-    return _log(path, "OptiTrack Motive", meanings, rows[at + 1 :], None if euler == "Quaternion" else euler, notes)
+    return _log(path, "OptiTrack Motive", columns, rows[at + 1 :], None if euler == "Quaternion" else euler, notes)
 
 
 def _motive_meaning(axis: str, kind: str, body: str, length: Unit) -> Meaning | None:
@@ -113,8 +111,10 @@ def _wide(fields: list[str], width: int) -> list[str]:
     return [field.strip() for field in fields] + [""] * (width - len(fields))
 
 
-def _log(path, kind, meanings, rows, euler, notes) -> Log:
-    """The log whose columns have the names and meanings of `meanings`, in their order."""
+def _log(path, kind, described, rows, euler, notes) -> Log:
+    """The log of columns that each have a name and a meaning."""
+    names, of_names = zip(*described, strict=True)
+    meanings = dict(zip(distinct(names), of_names, strict=True))
     count, data = len(meanings), [(number, fields) for number, fields in rows if any(fields)]
     if not data:
         raise InputError(Problem("has no rows below the header", str(path)))

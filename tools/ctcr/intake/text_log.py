@@ -16,7 +16,7 @@ import numpy as np
 from ctcr.arrays import Integers
 from ctcr.errors import InputError, Problem
 from ctcr.intake import makers
-from ctcr.intake.log import Log
+from ctcr.intake.log import Log, distinct
 from ctcr.intake.makers import Rows
 from ctcr.intake.names import RUN, meaning
 from ctcr.intake.units import named
@@ -64,7 +64,7 @@ def read(path: Path, content: bytes) -> Log:
     used = [i for i, name in enumerate(names) if name or any(columns[i])]  # an empty column without a name is none
     kind = f"text, separated by {_DELIMITERS[delimiter]}" + ", decimal commas" * decimal_comma
     names = _called(names, columns)
-    labels = tuple(_distinct([names[i] or f"#{i + 1}" for i in used]))
+    labels = tuple(distinct([names[i] or f"#{i + 1}" for i in used]))
     meanings = {name: makers.X_VALUE for name in labels if name == "X_Value"}
     return Log(path, kind, labels, tuple(columns[i] for i in used), numbers, decimal_comma, meanings, notes=notes)
 
@@ -290,13 +290,3 @@ def _called(names: list[str], columns: list[list[str]]) -> list[str]:
         f"{words[key]} {word}" if key in words and word != "name" else name
         for (key, word), name in zip(pairs, names, strict=True)
     ]
-
-
-def _distinct(names: list[str]) -> list[str]:
-    """The names, where one comes again with its count: x, x (2)."""
-    seen: Counter[str] = Counter()
-    made = []
-    for name in names:
-        seen[name] += 1
-        made.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
-    return made
