@@ -11,10 +11,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from ctcr import cli
-from ctcr.bench.devices import bench_file, emergency_stop, stepper_drive
+from ctcr.bench.devices import bench_file, emergency_stop, motors, stepper_drive
 from ctcr.bench.devices.axis_control import AxisControl
 from ctcr.bench.devices.bus_lock import bus_lock
-from ctcr.bench.devices.bus_process import last_bus
+from ctcr.bench.devices.bus_process import HOME_COUNT, _Owner, last_bus
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.joint_limits import JointLimits
 from ctcr.bench.devices.motion import StraightMove, VelocityMove
@@ -225,6 +225,21 @@ def test_no_numbers(settings, wrong):
     control = AxisControl(settings, HOME, homed=True)
     control._go_at(np.full(6, np.nan), 1.0, 9.0)
     assert not control.cycle(DT, HOME).any() and "not numbers" in str(control.fault) and not control.is_moving
+
+
+@pytest.mark.parametrize("encoder_counts", [400, 4096, 40000, 0xFFFF])
+def test_homing_is_kept(robot, tmp_path, encoder_counts):
+    """Counters show a robot as homed wherever its joints may be, and after power on as not homed, wherever they are."""
+    bench = bench_file.load(BENCH)
+    bench.motors.encoder_counts = encoder_counts
+    settings = motors.Motors(bench, robot, tmp_path).settings
+    for homed in (True, False):
+        for way in np.repeat([0.5, 4 * np.pi], 3) * np.array([[1], [-1], [0]]):  # [m], [rad]
+            counts = np.round(way / settings.ratios * encoder_counts) + homed * HOME_COUNT
+            bus = SimpleNamespace(inputs=lambda counts=counts: [SimpleNamespace(counter=int(one)) for one in counts])
+            control = _Owner(settings, tmp_path, None, bus, False)._control
+            assert control.homed == homed
+            np.testing.assert_allclose(control.joints, settings.home + way, atol=0.02)
 
 
 def test_drive_at_rest():

@@ -28,8 +28,9 @@ from ctcr.bench.shared.shared_record import MOST_AXES, SharedRecord
 from ctcr.errors import InputError
 from ctcr.show.output import write_json
 
-HOME_COUNT = 1_000_000  # of the counters at home; terminals count from 0 after power on, so 0 would prove nothing
-HOME_RANGE = 500_000  # counts: more than any axis travels
+# Of the counters at home, signed 32 bits; terminals count from 0 after power on, so 0 would prove nothing.
+HOME_COUNT = 1_000_000_000
+HOME_RANGE = 500_000_000  # counts: more than any axis travels, 7600 turns of the finest encoder
 SILENCE_S = 0.06  # of cycles without a good frame, before it is a fault; the terminals' watchdog waits for 0.1 s
 STATE_CYCLES = 25  # between two checks of the terminals' states
 READY_S = 0.5  # from enabling to ready
