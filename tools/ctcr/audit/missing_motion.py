@@ -7,7 +7,7 @@ before, and only the reading is recorded. By the table it came from the other si
 from dataclasses import replace
 
 import numpy as np
-import scipy  # loads scipy.stats, which takes half a second, when it is asked for
+import scipy  # not scipy.stats, which takes half a second: scipy loads it when it is asked for
 
 from ctcr import settings
 from ctcr.arrays import Array, Integers

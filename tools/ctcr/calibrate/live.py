@@ -99,7 +99,7 @@ def point_table(path: str | Path, points: Table, desk: Desk, frames: int, rounds
             touched = [rows.last_number(column) for column in POINT_COLUMNS[1:4]]
             if rows.last[0] != name or not np.allclose(touched, 1e3 * where):
                 text = "holds rows of other points: choose another name, or the points of those rows"
-                raise InputError(Problem(text, str(rows.path), rows.groups + 1, line_name="row"))
+                raise rows.fault(text)
         left = touches[rows.groups :]
         if left:
             tracker.connect()
@@ -191,7 +191,7 @@ class _Turner:
             if (number, sign) == (tube + 1, wanted) and off < OTHER_DEG:
                 return
         text = "holds rows at other angles: choose another name, or the --step-deg and limits of those rows"
-        raise InputError(Problem(text, str(rows.path), rows.groups + 1, line_name="row"))
+        raise rows.fault(text)
 
     def _motor_deg(self, tube: int, joints: Array) -> float:
         """Angle of the rotation motor of a tube since home [deg]."""

@@ -17,7 +17,7 @@ from ctcr.errors import InputError, Problem, did_you_mean, shown
 from ctcr.table.csv_table import Faults, header_names
 
 MAX_BYTES = 16 << 20
-MOST_COUNTED = 1e9  # tubes and readings are fewer
+MOST_COUNTED = 1e9  # of a number of tubes or readings: far more than there are, and exact as an integer
 
 UNITS = {
     "length": {"mm": 1e-3, "m": 1.0, "um": 1e-6},

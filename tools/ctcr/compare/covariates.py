@@ -34,8 +34,10 @@ class Covariate:
         """Columns (K, P) whose sums are smooth curves of the value, without the constant: plain ones, richer ones.
 
         A plain curve is found with few runs, a richer one follows more. Every column stays within -1..1, so that
-        a curve does not diverge on held-out values.
+        a curve does not diverge on held-out values. There are none where the value does not vary.
         """
+        if not self.varies:
+            return []
         if self.kind == "direction":
             return [self.value[:, None]]
         if self.kind == "angle":

@@ -169,8 +169,7 @@ def all_forms(
         for name, label, frame, design in special
     ]
     for item in items:
-        chosen = replace(item, value=item.value[rows])
-        for design in chosen.bases() if chosen.varies else []:
+        for design in replace(item, value=item.value[rows]).bases():
             regression = Regression(np.hstack([ones, np.nan_to_num(design)]), folds)
             forms += [Form(item.name, item.label, f, frames[f], regression, item) for f in ("base", "tip", "axis")]
     return forms

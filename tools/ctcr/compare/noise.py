@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy  # loads scipy.stats, which takes half a second, when it is asked for
+import scipy  # not scipy.stats, which takes half a second: scipy loads it when it is asked for
 from scipy.special import chdtri, ndtr
 
 from ctcr import settings
@@ -102,7 +102,7 @@ def direction_difference(
         scaled, reference = _block_quartiles(scaled, blocks), _block_quartiles(reference, same_blocks)
     p_same = np.nan
     if len(same) >= settings.FEWEST_PAIRS:
-        p_same = scipy.stats.mannwhitneyu(scaled, reference, alternative="greater").pvalue
+        p_same = p_larger(scaled, reference)
     rms = float(np.sqrt(square.mean()))
     motion = tip_step[opposite.later]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -169,6 +169,11 @@ def rms_mm(square: Array) -> float:
 
 def _block_quartiles(values: Array, blocks: Integers) -> Array:
     return group_quantiles(values, np.unique(blocks, return_inverse=True)[1], 0.75)
+
+
+def p_larger(sample: Array, reference: Array) -> float:
+    """P-value of the rank test that a sample (K,) is not larger than a reference (L,)."""
+    return float(scipy.stats.mannwhitneyu(sample, reference, alternative="greater").pvalue)
 
 
 def beyond(square: Array, axis: float, blocks: Integers) -> float:

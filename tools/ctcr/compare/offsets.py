@@ -3,14 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy  # loads scipy.stats, which takes half a second, when it is asked for
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from ctcr import settings
 from ctcr.arrays import Array, Integers, Mask
 from ctcr.compare.crossvalidation import Folds, Regression, chance, group_means, segments
-from ctcr.compare.noise import NoiseFloor, beyond, rms_mm
+from ctcr.compare.noise import NoiseFloor, beyond, p_larger, rms_mm
 from ctcr.compare.sample import Sample
 from ctcr.compare.visits import SAME, Revisits, Stops
 from ctcr.frames import rigid_motion
@@ -97,7 +96,7 @@ def find_run_offsets(sample: Sample, stops: Stops, revisits: Revisits, noise: No
     between, within = square[revisits.between_runs], square[~revisits.between_runs]
     p_value, alike = np.nan, revisits.select((revisits.kind == SAME) & revisits.between_runs)
     if min(len(between), len(within)) >= settings.FEWEST_PAIRS:
-        p_value = float(scipy.stats.mannwhitneyu(between, within, alternative="greater").pvalue)
+        p_value = p_larger(between, within)
     elif len(alike) >= settings.FEWEST_PAIRS and np.isfinite(noise.axis_mm):
         scaled, axis = alike.square / alike.noise_factor, settings.NOTABLE * 1e-3 * noise.axis_mm
         p_value = beyond(scaled, axis, segments(stops.run[alike.later]))

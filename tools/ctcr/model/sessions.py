@@ -14,6 +14,7 @@ from ctcr import settings
 from ctcr.arrays import Array, Integers
 from ctcr.model import parameters
 from ctcr.model.noise import noise_of_readings
+from ctcr.model.protocol import ResidualModel
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
@@ -33,11 +34,8 @@ def as_given(model: Any) -> Any:
     return model.as_given() if isinstance(model, SessionRecording) else model
 
 
-class SessionRecording:
-    """A recording of readings with sessions, beside which each run keeps what little of its own they left in it.
-
-    It is a `ResidualModel`: whatever is not defined here is that of the recording `table`.
-    """
+class SessionRecording(ResidualModel):
+    """A recording of readings with sessions, beside which each run keeps what little of its own they left in it."""
 
     def __init__(self, robot: Robot, readings: Measurements, table: Any, as_given: Callable[[], Any], homes: Any):
         """table: the recording of the readings; as_given(): of these as they were taken; homes: as `table`, whose
@@ -55,10 +53,24 @@ class SessionRecording:
         self.weight = 1 / np.repeat(np.hypot(jitter, field), 3) ** 2
         self.origin = readings.sessions.origin
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("__") or name == "table":
-            raise AttributeError(name)
-        return getattr(self.table, name)
+    def nominal(self) -> Array:
+        return self.table.nominal()
+
+    def activate(self, rows: Sequence[bool]) -> None:
+        self.table.activate(list(rows))
+
+    def unsolved(self) -> list[int]:
+        return self.table.unsolved()
+
+    def predicted(self) -> tuple[Array, Array]:
+        return self.table.predicted()
+
+    @property
+    def friction_is_solved(self) -> bool:
+        return self.table.friction_is_solved
+
+    def solve_friction(self, x: Array) -> float:
+        return self.table.solve_friction(x)
 
     def begin_at(self, other: "SessionRecording") -> None:
         if type(other.table) is type(self.table):

@@ -28,9 +28,9 @@ from ctcr.bench.shared.shared_record import MOST_AXES, SharedRecord
 from ctcr.errors import InputError
 from ctcr.show.output import write_json
 
-# Of the counters at home, signed 32 bits; terminals count from 0 after power on, so 0 would prove nothing.
-HOME_COUNT = 1_000_000_000
-HOME_RANGE = 500_000_000  # counts: more than any axis travels, 7600 turns of the finest encoder
+# Homing writes this count into the counters, which have 32 bits and a sign. After power on they count from 0, so a
+# count within HOME_RANGE of it proves that the axis was homed since: no axis makes 7600 turns of the finest encoder.
+HOME_COUNT, HOME_RANGE = 1_000_000_000, 500_000_000
 SILENCE_S = 0.06  # of cycles without a good frame, before it is a fault; the terminals' watchdog waits for 0.1 s
 STATE_CYCLES = 25  # between two checks of the terminals' states
 READY_S = 0.5  # from enabling to ready

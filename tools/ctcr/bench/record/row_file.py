@@ -46,9 +46,9 @@ class RowFile:
         try:
             fields = next(csv.reader([line.decode()]))
         except UnicodeDecodeError:
-            raise self._fault(f"is not text in UTF-8: {MEND}") from None
+            raise self.fault(f"is not text in UTF-8: {MEND}") from None
         if len(fields) != len(self._columns):
-            raise self._fault(f"has {len(fields)} fields: the header has {len(self._columns)}: {MEND}")
+            raise self.fault(f"has {len(fields)} fields: the header has {len(self._columns)}: {MEND}")
         return fields
 
     def last_number(self, column: str) -> float:
@@ -59,10 +59,11 @@ class RowFile:
         except ValueError:
             number = nan
         if not isfinite(number):
-            raise self._fault(f"{shown(text)} is not a number: {MEND}", column)
+            raise self.fault(f"{shown(text)} is not a number: {MEND}", column)
         return number
 
-    def _fault(self, text: str, column: str | None = None) -> InputError:
+    def fault(self, text: str, column: str | None = None) -> InputError:
+        """The error that the last row makes, or its field in a column."""
         return InputError(Problem(text, str(self.path), self._row, column, line_name="row"))
 
     def append(self, rows: list[Row]) -> None:
