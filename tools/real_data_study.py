@@ -23,7 +23,8 @@ import numpy as np  # noqa: E402
 from ctcr.api.reviewed import reviewed  # noqa: E402
 from ctcr.conventions import Review  # noqa: E402
 from ctcr.show.output import atomic_writer, write_json  # noqa: E402
-from ctcr.show.style import ERROR, FAINT, GOOD, NOISE, picture  # noqa: E402
+from ctcr.show.palette import ERROR, FAINT, GOOD, NOISE  # noqa: E402
+from ctcr.show.style import picture  # noqa: E402
 from ctcr.show.wording import most, short  # noqa: E402
 from origin import ROOT  # noqa: E402
 

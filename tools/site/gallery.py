@@ -10,7 +10,7 @@ from html import escape, unescape
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from ctcr.show import style
+from ctcr.show import palette
 from PIL import Image
 
 BLOCK = re.compile(r"```bash\n(.*?)```\n", re.DOTALL)
@@ -50,7 +50,7 @@ def _shown(block: str, project: Path) -> str:
         return f'<a href="{written}"><img src="{written}" alt="{name}"></a>\n'
     drawing, words = FIGURE.search((project / written).read_text()).groups()
     picture = f"reports/{name}.svg"
-    (project / picture).write_text(drawing.replace(">", f"><style>:root {{{style.colours(False)}}}</style>", 1))
+    (project / picture).write_text(drawing.replace(">", f"><style>:root {{{palette.colours(False)}}}</style>", 1))
     caption = unescape(re.sub("<[^>]*>", "", words))
     return (
         f'<figure><a href="{written}"><img src="{picture}" alt="{escape(caption)}"></a>'

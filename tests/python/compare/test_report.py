@@ -85,7 +85,7 @@ def test_scene():
 
 def test_escaping(monkeypatch):
     """A robot name with HTML in it adds no script to the page."""
-    monkeypatch.setattr("ctcr.show.html_page.draw", lambda *_: None)
+    monkeypatch.setattr("ctcr.show.style.draw", lambda *_: None)
     robot, readings, prediction = planted(runs=6)
     robot.name = "</script><script>alert(1)</script>"
     page = Page(report.page(compare(robot, readings, prediction)))

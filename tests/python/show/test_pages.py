@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from ctcr import cli, inputs
 from ctcr.show import html_page, scene
-from ctcr.show.style import ERROR, draw
+from ctcr.show.palette import ERROR
+from ctcr.show.style import draw
 
 DEMO = Path(__file__).parents[3] / "examples" / "data" / "demo"
 ROBOT, TABLE = DEMO / "robot.yaml", DEMO / "measurements.csv"

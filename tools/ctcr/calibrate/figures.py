@@ -6,7 +6,8 @@ from ctcr import settings
 from ctcr.arrays import evenly
 from ctcr.calibrate.joint_fit import Calibration
 from ctcr.show import scene as show
-from ctcr.show.style import ERROR, FAINT, GOOD, INK, LINE, NOISE, OUT, TINT, noise_below, shares_below
+from ctcr.show.palette import ERROR, FAINT, GOOD, INK, LINE, NOISE, OUT, TINT
+from ctcr.show.style import noise_below, shares_below
 from ctcr.show.wording import mm
 
 MOST_NAMES = 60

@@ -7,7 +7,7 @@ import numpy as np
 
 from ctcr.arrays import Array, Mask, evenly
 from ctcr.show import scene
-from ctcr.show.style import BACK, ERROR, FAINT, INK, NOISE, OUT, TINT
+from ctcr.show.palette import BACK, ERROR, FAINT, INK, NOISE, OUT, TINT
 from ctcr.table.measurements import Measurements
 
 WIDTH, ROW_HEIGHT = 10.4, 3.6

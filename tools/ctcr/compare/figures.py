@@ -10,7 +10,8 @@ from ctcr.compare.analysis import Comparison
 from ctcr.compare.dependence import FRAME_NAMES, Dependence
 from ctcr.compare.sample import Sample
 from ctcr.compare.visits import OPPOSITE, SAME
-from ctcr.show.style import AXES, BACK, ERROR, FAINT, NOISE, OUT, TINT, noise_below, shares_below
+from ctcr.show.palette import AXES, BACK, ERROR, FAINT, NOISE, OUT, TINT
+from ctcr.show.style import noise_below, shares_below
 
 Abscissa = tuple[Array, str, str]  # values, label, and the frame in which the error depends on them
 

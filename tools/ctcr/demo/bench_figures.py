@@ -10,7 +10,7 @@ from ctcr.arrays import Array
 from ctcr.model import simulation
 from ctcr.robot.description import Robot
 from ctcr.show import scene as show
-from ctcr.show.style import BACK, ERROR, FAINT, GOOD, INK, NOISE, OUT, PALE_BACK, PALE_OUT
+from ctcr.show.palette import BACK, ERROR, FAINT, GOOD, INK, NOISE, OUT, PALE_BACK, PALE_OUT
 from ctcr.table.measurements import Measurements
 
 OURS, SIMULATED = PALE_OUT, PALE_BACK

@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,12 +33,13 @@ from ctcr.robot.description import Robot
 from ctcr.robot.ledger import Change, Entry
 from ctcr.show.output import Progress
 from ctcr.show.result import Glance, Shown, frame
-from ctcr.show.style import Picture, picture
 from ctcr.show.wording import deviation, number, sentence
 from ctcr.table.measurements import Measurements
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+
+    from ctcr.show.style import Picture
 
 
 @dataclass(frozen=True, repr=False)
@@ -102,10 +104,10 @@ class Added(Shown):
         changes, entry = _change(self)
         return ledger.write(self.before, path, changes, entry, effects=self.after.effects, in_place=in_place)
 
-    def plot(self) -> Picture:
+    def plot(self) -> "Picture":
         """The error after each step, a matplotlib figure; `savefig` writes it."""
         stages = [history.Stage(name, size, "") for name, size in self._errors()]
-        made = picture(history.draw_waterfall, stages, 10.4, 4.4)
+        made = import_module("ctcr.show.style").picture(history.draw_waterfall, stages, 10.4, 4.4)
         assert made is not None
         return made
 

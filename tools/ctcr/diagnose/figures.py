@@ -6,7 +6,7 @@ from ctcr.compare.figures import drawable
 from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.diagnose.round import imitated
 from ctcr.fit.result import Fit
-from ctcr.show.style import ERROR, FAINT, GOOD, INK, NOISE, PALETTE, TINT
+from ctcr.show.palette import ERROR, FAINT, GOOD, INK, NOISE, PALETTE, TINT
 from ctcr.show.wording import short
 
 CANDIDATES = 10

@@ -9,7 +9,7 @@ from ctcr.reproduce.paper import COLUMNS, Claim, paper_robot
 from ctcr.sensitivity import report as sensitivity
 from ctcr.show import html_page
 from ctcr.show.html_page import cards, figure, table, view
-from ctcr.show.style import AXES, ERROR, NOISE, PALE_BACK, PALE_OUT, TINT
+from ctcr.show.palette import AXES, ERROR, NOISE, PALE_BACK, PALE_OUT, TINT
 from ctcr.track import figures as track
 from ctcr.track.result import errors_mm
 from ctcr.track.scenario import shipped

@@ -6,7 +6,7 @@ from ctcr.robot.description import Robot
 from ctcr.robot.ledger import section
 from ctcr.show import html_page
 from ctcr.show.output import table
-from ctcr.show.style import ERROR, NOISE, OUT
+from ctcr.show.palette import ERROR, NOISE, OUT
 from ctcr.show.wording import visible
 
 COLUMNS = {

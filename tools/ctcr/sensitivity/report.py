@@ -11,7 +11,7 @@ from ctcr.sensitivity.open_loop import OpenLoop
 from ctcr.sensitivity.terminal import CLOSED_COLUMNS, OPEN_COLUMNS, closed_rows, closing, open_rows
 from ctcr.show import html_page
 from ctcr.show.html_page import bullets, figure, table
-from ctcr.show.style import AXES, ERROR, FAINT, INK
+from ctcr.show.palette import AXES, ERROR, FAINT, INK
 
 
 def page(found: dict[str, Any], files: Sequence[str], accuracy: float) -> str:

@@ -3,7 +3,7 @@
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import date
-from importlib import resources
+from importlib import import_module, resources
 from importlib.metadata import version
 from typing import Any
 
@@ -11,7 +11,7 @@ import click
 
 from ctcr import inputs
 from ctcr.errors import InputError
-from ctcr.show.style import colours, draw
+from ctcr.show.palette import colours
 from ctcr.show.wording import as_html
 
 SHORT = 12  # digits of a fingerprint that a page shows
@@ -101,7 +101,9 @@ def bullets(lines: Iterable[str]) -> str:
 
 def figure(plot: Any, subject: Any, width: float, height: float, caption: str, wide: bool = False) -> str:
     """A picture of `subject` with its caption; empty where there is nothing to draw."""
-    drawn = draw(plot, subject, width, height)
+    drawn = import_module("ctcr.show.style").draw(
+        plot, subject, width, height
+    )  # matplotlib loads where something is drawn
     kind = ' class="wide"' if wide else ""
     return f"<figure{kind}>{drawn}<figcaption>{as_html(caption)}</figcaption></figure>" if drawn else ""
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from ctcr.arrays import Array
 from ctcr.robot.description import Robot
 from ctcr.show import scene as show
-from ctcr.show.style import AXES, ERROR, FAINT, GOOD, INK, PALE_ERROR, PALE_OUT
+from ctcr.show.palette import AXES, ERROR, FAINT, GOOD, INK, PALE_ERROR, PALE_OUT
 from ctcr.track.result import Run, by_mass, errors_mm
 from ctcr.track.scenario import TASKS, Scenario
 
