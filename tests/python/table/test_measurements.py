@@ -240,3 +240,20 @@ def test_memory(load):
     numbers = read.beta.nbytes + read.alpha.nbytes + read.position.nbytes
     assert len(read) == 50_000
     assert peak < 3 * numbers + 20 * csv_table.BLOCK_BYTES
+
+
+@pytest.mark.parametrize("group", ["beta", "alpha", "force", "position"])
+def test_beyond_any_unit(tmp_path, group):
+    """A value that is usual in no unit is a fault of its row: no other convention is tried on it, which would overflow.
+    One that another unit makes usual is kept, with the refusal."""
+    for value, kept in ((1e300, False), (-4e4, True)):
+        table = random_table(np.random.default_rng(1), 5, 2)
+        table[group][3, 0] = value
+        path = tmp_path / "table.csv"
+        path.write_text(as_text(table, 2))
+        if kept:
+            assert measurements.read(path).refusal is not None
+            continue
+        with pytest.raises(InputError) as caught:
+            measurements.read(path)
+        assert [(problem.line, problem.field) for problem in caught.value.problems] == [(5, group_columns(2)[group][0])]

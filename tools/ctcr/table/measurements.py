@@ -17,7 +17,7 @@ from ctcr import settings
 from ctcr.arrays import Array, Integers, Mask
 from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.robot.description import MAX_TUBES, Robot
-from ctcr.robot.units import Quantity
+from ctcr.robot.units import LARGEST, Quantity
 from ctcr.show.output import Progress
 from ctcr.show.result import Glance, Shown, frame
 from ctcr.show.wording import counted, listed
@@ -304,8 +304,8 @@ def check(name: str, block: Array, rows: Integers, columns: list[str], faults: F
         if name not in _MAY_BE_EMPTY:
             faults.where(np.isnan(values), rows, column, "empty", lambda _: f"is empty{needs}")
         faults.where(np.isinf(values), rows, column, "finite", lambda _: f"is not finite{needs}")
-        if quantity and plausible:
-            strange = np.isfinite(values) & (np.abs(values) > quantity.usual[1])
+        if quantity:  # what no unit makes usual would overflow where conventions are tried
+            strange = np.isfinite(values) & (np.abs(values) > (quantity.usual[1] if plausible else LARGEST))
             faults.where(strange, rows, column, "unit", lambda i, v=values: quantity.doubt(v[i]))
     if name == "run":
         number = block[:, 0]
