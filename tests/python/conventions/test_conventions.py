@@ -318,6 +318,17 @@ def test_frozen():
     assert np.isnan(found.readings.position[rows]).all()
 
 
+def test_frozen_from_the_first():
+    """A tracker that gives one pose in all rows, so that no step tells its resolution, stood still too."""
+    robot, readings = bench(17)
+    still = {name: np.repeat(getattr(readings, name)[:1], len(readings), axis=0) for name in ("position", "quaternion")}
+    found = review(robot, replace(readings, **still))
+    elsewhere = (readings.load_space != readings.load_space[0]).any(axis=1)
+    [one] = found.findings
+    assert (one.kind, list(one.rows)) == ("frozen", readings.row[elsewhere].tolist())
+    assert np.isnan(found.readings.position[elsewhere]).all() and not found.unexplained
+
+
 def test_frozen_at_stops():
     """Where the robot stops while the tracker repeats an old pose, all readings of the stop are missing."""
     robot, readings = bench(17)

@@ -37,7 +37,7 @@ def stood_still(robot: Robot, readings: Measurements) -> tuple[Finding, Mask] | 
         tips.predicted(robot, readings.rows(rows)) - tips.predicted(robot, readings.rows(first[rows])), axis=1
     )
     steps = np.abs(np.diff(readings.positions, axis=0))
-    resolution = float(np.min(steps[steps > 0], initial=np.inf))
+    resolution = float(np.min(steps[steps > 0])) if (steps > 0).any() else 0.0  # of one pose alone nothing is known
     noise = np.sqrt(6) * 1e-3 * (robot.tracker.jitter_mm or 0.0)
     visible = moved > settings.SPIKE_VISIBLE * max(noise, resolution)
     if not visible.any():
