@@ -109,6 +109,17 @@ def test_right(n_tubes):
         assert (found.findings, found.unexplained) == ([], "")
 
 
+def test_right_with_a_rough_tracker():
+    """Jitter is no error of the table, however large it is beside the robot."""
+    robot, readings = bench(19)
+    deployed = 1e3 * np.median(np.max(readings.beta + robot.lengths, axis=1))
+    robot.tracker.jitter_mm = 0.1 * deployed
+    position = readings.position + np.random.default_rng(2).normal(0, 1e-4 * deployed, readings.position.shape)
+    for table in (readings, replace(readings, position=position)):
+        found = review(robot, table)
+        assert (found.findings, found.unexplained) == ([], "")
+
+
 @pytest.mark.parametrize("n_tubes", [2, 3])
 def test_poses_of_other_rows(n_tubes):
     """Poses that belong to other joints are no known convention: none is named, and this is said."""

@@ -44,6 +44,11 @@ class Calibrated:
         return replace(self, error=self.error[rows])
 
     @property
+    def beyond_jitter(self) -> float:
+        """The part [m] of the typical error that jitter does not make."""
+        return float(self._beyond_jitter[0])
+
+    @property
     def _beyond_jitter(self) -> Array:
         """The part [m] that jitter does not make: of the typical error, and of the one that 90 % do not exceed."""
         sizes = np.array([self.typical, np.exp(np.quantile(self.log_error, 0.9))])

@@ -80,10 +80,10 @@ def corrected(robot: Robot, readings: Measurements, of_runs: Measurements) -> tu
             break
         found += _findings(case, better)
         case = better.case
-    left = case.fit.typical
+    left = case.fit.beyond_jitter
     # Runs need not share a frame: what each has of its own is told apart later.
     if case.share_of(left) >= settings.PHYSICS_LEAVES:
-        left = min(left, _with_run_frames(case, of_runs).typical)
+        left = min(left, _with_run_frames(case, of_runs).beyond_jitter)
     if case.share_of(left) < settings.PHYSICS_LEAVES:
         return case, found, ""
     return given, [], _unexplained(case, left, found)
