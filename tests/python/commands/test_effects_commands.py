@@ -155,6 +155,21 @@ def test_remove_undoes_add(run, robot, plan, table, tmp_path, hidden):
     ]
 
 
+def test_remove_forgets_the_sensor(run, robot, plan, tmp_path, hidden):
+    """A pose of the sensor that was not known is not known again once the effect that it was fitted with is gone."""
+    given, data, added, last = (tmp_path / name for name in ("0.yaml", "m.csv", "1.yaml", "2.yaml"))
+    unknown = "\n  sensor_position_mm: null\n  sensor_rotation_vector_rad: null\n"
+    given.write_text(ROBOT.read_text().replace("\n  sensor_on_tube: 1\n", f"\n  sensor_on_tube: 1{unknown}"))
+    simulation.write(simulation.simulate(hidden(robot, delay="0.05"), plan), data)
+    free = ("--free", ",".join([*CALIBRATION, "tracker.sensor"]))
+    assert run("add", given, "delay", "--fit", data, "-o", added, *free)[0] == 0
+    assert robot_file.load(added).tracker.sensor_rotation_known
+    code, out, _ = run("remove", added, "delay", "-o", last)
+    old, new = robot_file.load(given), robot_file.load(last)
+    assert code == 0 and "changed since" not in out
+    assert not new.effects and (old.tracker, old.uncertainty) == (new.tracker, new.uncertainty)
+
+
 # ---- commands
 
 

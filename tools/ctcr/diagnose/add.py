@@ -256,10 +256,10 @@ def _undone(robot: Robot, entry: Mapping[str, Any]) -> tuple[list[Change], int]:
         except (AttributeError, IndexError, TypeError, KeyError):
             kept += 1
             continue
-        if row.get("old") is None or now != row.get("new"):
+        if "old" not in row or now != row.get("new"):
             kept += 1
         else:
-            changes.append(Change(path, str(row.get("unit", "")), float(row["old"])))
+            changes.append(Change(path, str(row.get("unit", "")), row["old"]))
     return changes, kept
 
 

@@ -32,11 +32,12 @@ _RECORDED_NOTE = "of the controller that recorded the tables; remove once it use
 @dataclass(frozen=True)
 class Change:
     """A number of the file, at a path such as ("tubes", 0, "length_mm") or ("tracker", "position_mm", 2), or a list,
-    and its new value in the unit of that field; `deviation` is its standard deviation, or a list, where known."""
+    and its new value in the unit of that field, None where it is not known; `deviation` is its standard deviation, or a
+    list, where known."""
 
     path: FieldPath
     unit: str
-    new: float | list
+    new: float | list | None
     deviation: float | list[float] | None = None
 
 
