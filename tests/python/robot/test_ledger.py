@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr.errors import InputError
-from ctcr.robot import history, ledger, robot_file
+from ctcr.robot import history, ledger, new_file, robot_file
 from ctcr.robot.ledger import Change, Entry
 
 ROOT = Path(__file__).parents[3]
@@ -41,6 +41,19 @@ def test_layout(tmp_path):
     ledger.write(robot_file.load(tmp_path / "a.yaml"), tmp_path / "b.yaml", [LENGTH], Entry("x"))
     new = (tmp_path / "b.yaml").read_text()
     assert new.startswith(text.replace("length_mm: 330.5", "length_mm: 331.25"))
+
+
+@pytest.mark.parametrize("n", range(1, 5))
+def test_new_file_changed(tmp_path, n):
+    """A file of `ctcr init` stays as it is but for new homes: what is not known stays `null`, and the comment above a
+    section stays directly above it."""
+    text = new_file.text(new_file.example(n))
+    (tmp_path / "a.yaml").write_text(text)
+    home = Change(("actuation", "home_rotation_deg", 0), "deg", -1.5)
+    ledger.write(robot_file.load(tmp_path / "a.yaml"), tmp_path / "b.yaml", [home], Entry("x"))
+    new = re.sub(r"  recorded_home_.*\n", "", (tmp_path / "b.yaml").read_text().partition("history:")[0])
+    expected = text.replace("home_rotation_deg: [0", "home_rotation_deg: [-1.5")
+    assert [line.split() for line in new.splitlines()] == [line.split() for line in expected.splitlines()]
 
 
 def test_entry(robot, tmp_path):

@@ -145,7 +145,8 @@ def _keep_recorded(actuation: CommentedMap, key: str) -> None:
         return
     values = CommentedSeq(_plain(value) for value in actuation[key])
     values.fa.set_flow_style()
-    actuation.insert(list(actuation).index(key) + 1, kept, values, comment=_RECORDED_NOTE)
+    # Above them: a comment below a field, such as that of the next section, belongs to the field.
+    actuation.insert(list(actuation).index(key), kept, values, comment=_RECORDED_NOTE)
 
 
 def _set_effects(document: CommentedMap, effects: Mapping[str, Mapping[str, Any]]) -> None:

@@ -14,6 +14,8 @@ from typing import Any
 from pydantic import ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.nodes import ScalarNode
+from ruamel.yaml.representer import RoundTripRepresenter
 from ruamel.yaml.util import load_yaml_guess_indent
 
 from ctcr import _core, settings
@@ -29,6 +31,16 @@ NO_PYTHON = (
     "effects written in Python cannot act here, where compiled code runs: write it in C++ (docs/effects.md), or take it"
     " out (ctcr remove)"
 )
+
+
+class _Representer(RoundTripRepresenter):
+    """Writes what is not known as `null`, as the format calls it, not as an empty field."""
+
+    def represent_none(self, data: None, **_: Any) -> ScalarNode:
+        return self.represent_scalar("tag:yaml.org,2002:null", "null")
+
+
+_Representer.add_representer(type(None), _Representer.represent_none)
 
 user_effects: dict[str, Any] = {}  # effects of users' files by id, which robot files may hold; see `ctcr.user_effects`
 
@@ -84,6 +96,7 @@ def layout(robot: Robot) -> tuple[YAML, CommentedMap]:
     """The document of a robot with the comments and order of its file, and a writer that keeps indents and quotes."""
     values = robot.model_dump(exclude_unset=True)
     yaml = YAML(typ="rt", pure=True)
+    yaml.Representer = _Representer
     yaml.preserve_quotes = True
     yaml.width = LINE_WIDTH
     if robot._source is None:
