@@ -1,6 +1,7 @@
 """ctcr effects, add, remove, simulate, history, and the effects of a robot in predict, compare and shape."""
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -164,6 +165,9 @@ def test_remove_forgets_the_sensor(run, robot, plan, tmp_path, hidden):
     free = ("--free", ",".join([*CALIBRATION, "tracker.sensor"]))
     assert run("add", given, "delay", "--fit", data, "-o", added, *free)[0] == 0
     assert robot_file.load(added).tracker.sensor_rotation_known
+    assert re.search(
+        r"The sensor's pose is unknown: .* fit the readings best\.( |$)", robot_file.load(added).history[0]["note"]
+    )
     code, out, _ = run("remove", added, "delay", "-o", last)
     old, new = robot_file.load(given), robot_file.load(last)
     assert code == 0 and "changed since" not in out

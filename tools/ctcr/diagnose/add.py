@@ -190,7 +190,7 @@ def add(
         nuisances.append(smooth_field.message(smooth))
     fit = lags.widened(stage.engine, one_sided.widened(fit))
     stages.append(Stage("noise_floor", *joint.tracker_error(fit, fit.noise)))
-    notices = [*said, *about_outliers, *_notices(robot, fit, ids, explained), *nuisances]
+    notices = [*map(sentence, said), *about_outliers, *_notices(robot, fit, ids, explained), *nuisances]
     after, name = fit.apply(stage.robot), folds.named(readings, held_out)
     floor = floors(robot.with_effects(after.effects), given)
     after = placed(after, readings.sessions)
