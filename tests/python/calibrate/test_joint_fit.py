@@ -130,6 +130,16 @@ def test_report(calibration):
     assert [layer.get("choice") for layer in drawing["layers"]] == [None, 0, 1] and len(drawing["choices"]) == 2
 
 
+def test_headline(calibration):
+    """The line on a calibration compares errors of the same readings and says which way they went; the error on
+    held-out readings stands beside them."""
+    first, last = calibration.stages[0].rms_mm, calibration.stages[-1].rms_mm
+    held = calibration.held_out.error.rms_mm
+    assert f"{first:.3g} to {last:.3g} mm RMS, {held:.3g} mm held out" in repr(calibration)
+    assert "falls from" in report.headline(calibration)
+    assert "rises from" in report.headline(replace(calibration, stages=calibration.stages[::-1]))
+
+
 def test_json(capsys):
     """JSON holds the figures; standard output holds nothing else."""
     code = cli.run(

@@ -103,8 +103,8 @@ class Calibration(Result):
         stages = [*self.stages, *([self.held_out.error] if self.held_out else [])]
         rows = [[stage.name, f"{stage.rms_mm:.3f}"] for stage in stages]
         rows += [[name, f"{size:.3f}"] for name, size in self.floors.rows() if isfinite(size)]
-        first, last = self.stages[0].rms_mm, stages[-1].rms_mm
-        held = " on held-out readings" if self.held_out else ""
+        first, last = self.stages[0].rms_mm, self.stages[-1].rms_mm
+        held = f", {self.held_out.error.rms_mm:.3g} mm held out" if self.held_out else ""
         line = f"Calibration {self.before.name}: {len(self.fitted)} parameters, {first:.3g} to {last:.3g} mm RMS{held}"
         return Glance(line, ["error", "mm RMS"], rows, [*self.doubts, *self.notices], warnings=self.readings.doubts)
 

@@ -51,7 +51,8 @@ def show(console, c: Calibration) -> None:
 def headline(c: Calibration) -> str:
     """The result in one or two sentences."""
     before, after = c.stages[0].rms_mm, c.stages[-1].rms_mm
-    text = f"{len(c.fitted)} parameters fitted: the error falls from {mm(before)} to {mm(after)} RMS"
+    way = "rises" if after > before else "falls"
+    text = f"{len(c.fitted)} parameters fitted: the error {way} from {mm(before)} to {mm(after)} RMS"
     if c.held_out:
         text += f", {mm(c.held_out.error.rms_mm)} on held-out {c.held_out.kind}"
     text += f". Expected error of a right model: {mm(c.floors.expected_error_mm)}."
