@@ -7,8 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr import cli
+from ctcr.commands import next as next_runs
+from ctcr.commands import options
+from ctcr.diagnose.verdict import Verdict
 from ctcr.model import simulation
-from ctcr.plan.proposal import Contest, random_runs, table
+from ctcr.plan.proposal import Contest, Proposal, random_runs, table
 from ctcr.table import measurements
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
@@ -70,6 +73,17 @@ def test_masses(tmp_path, capsys):
     """Masses must be grams."""
     assert cli.run(["next", "robot.yaml", "table.csv", "--masses", "ten"]) == 2
     assert "grams" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("word", ["identified", "nothing_missing", "probable", "stand_in", "not_in_catalogue"])
+def test_nothing_to_decide(capsys, word):
+    """Without rivals `next` says that nothing is open only where the verdict does, and else what the verdict says."""
+    verdict = Verdict(word, 0.6, [], ["The next explanation is another one."])
+    next_runs._show(options.Output(), 3, verdict, Proposal([], np.inf, [], [], None))
+    said = " ".join(capsys.readouterr().out.split())
+    settled = word in ("identified", "nothing_missing")
+    assert ("Nothing is open" in said) == settled and (verdict.sentences[0] in said) != settled
+    assert f"the verdict on these measurements is {word.replace('_', ' ')}." in said
 
 
 @pytest.mark.slow

@@ -49,7 +49,7 @@ def command(robot, measurements, runs, masses, target, threads, anyway, frame_pe
         }
     )
     out.say(*said)
-    _show(out, loaded.n_tubes, diagnosis.verdict.word.replace("_", " "), proposal)
+    _show(out, loaded.n_tubes, diagnosis.verdict, proposal)
     if writes:
         out.say(f"Plan: {target}")
 
@@ -67,11 +67,14 @@ def _masses(text: str) -> tuple[float, ...]:
     return tuple(1e-3 * gram for gram in grams)
 
 
-def _show(out, n_tubes: int, verdict: str, proposal) -> None:
+def _show(out, n_tubes: int, verdict, proposal) -> None:
     from ctcr.effects import catalogue
 
     if len(proposal.rivals) < 2:
-        out.say(f"Nothing is open between effects: the verdict on these measurements is {verdict}.")
+        settled = verdict.word in ("identified", "nothing_missing")
+        why = "Nothing is open between effects" if settled else "No two effects are rivals, of which runs could decide"
+        out.say(f"{why}: the verdict on these measurements is {verdict.word.replace('_', ' ')}.")
+        out.say(*([] if settled else verdict.sentences))
         return
     out.say(f"Open: {' or '.join(rival.id for rival in proposal.rivals)}.")
     rows = [
