@@ -95,7 +95,9 @@ def said(robot, table, predicted):
     fit = SimpleNamespace(apply=lambda _: robot, residual=residual, expected_square=square, inflation=np.ones(2))
     (message,) = messages(robot, table, fit, np.ones(1, bool))
     size = 1e3 * np.linalg.norm(residual[0, :3])
-    assert message.startswith(f"Reading 2 is {size:.2g} mm off") and message.endswith("The errors are without it")
+    assert message.startswith(f"The reading in row 2 is {size:.2g} mm off") and message.endswith(
+        "The errors are without it"
+    )
     return message
 
 

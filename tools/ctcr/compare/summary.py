@@ -303,8 +303,8 @@ def limits(c: Comparison) -> Iterator[str]:
         yield "What the error depends on is examined once the conventions are right."
     elif not c.ranking.alone:
         yield (
-            f"The readings fall into {c.ranking.blocks} independent parts, too few to judge a constant offset or "
-            f"dependences."
+            f"The readings fall into {counted(c.ranking.blocks, 'independent part')}, too few to judge a constant "
+            "offset or dependences."
         )
     if len(c.ranking.rows) < len(c.sample.row) and not c.wrong:
         yield f"Dependences were examined on {len(c.ranking.rows)} of {len(c.sample.row)} readings, evenly spread."

@@ -54,7 +54,7 @@ def messages(robot: Robot, measurements: Measurements, fit: Any, isolated: Mask)
     fitted, said = fit.apply(robot), []
     for k in np.flatnonzero(isolated):
         far = np.linalg.norm(fit.residual[k, :3])
-        text = f"Reading {measurements.row[k]} is {1e3 * far:.2g} mm off, and its neighbours are not: "
+        text = f"The reading in row {measurements.row[k]} is {1e3 * far:.2g} mm off, and its neighbours are not: "
         others = np.linalg.norm(snaps.other_tips(fitted, measurements, k) - measurements.position[k], axis=1)
         expected = settings.SURPRISE * fit.inflation[0] * np.sqrt(fit.expected_square[k, 0])
         if len(others) and others.min() < max(expected, settings.SNAP_ERROR * far):
