@@ -22,6 +22,7 @@ MAX_HEADER_BYTES = 1 << 16
 SHOWN_PER_KIND = 3  # rows shown of each kind of fault; the others are counted
 SHOWN = 20  # faults shown of a table
 
+_IMPORT = " (ctcr import does so with a log)"
 _NUMBER_BYTES = b"0123456789+-.eE, "
 _NUMBER = re.compile(r" *[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)? *")
 
@@ -107,6 +108,8 @@ def open_table(path: str | Path) -> NumberTable:
     """Reads the header and counts the rows. Raises InputError where the file is no table of text."""
     with open_input(path) as file:
         columns = header_names(file.readline(MAX_HEADER_BYTES), str(path))
+        if any('"' in name for name in columns):
+            raise InputError(Problem(f"holds quotes: write names and numbers without{_IMPORT}", str(path)))
         start = file.tell()
         end = _end_of_content(file, start)
         n_rows = _count_lines(file, start, end)
@@ -137,7 +140,7 @@ def header_names(header: bytes, file: str) -> tuple[str, ...]:
         "has an empty first row: it must name the columns": not text,
         "ends its lines with CR alone: save it with LF or CR LF": "\r" in text,
         "has a first row without end: this is not a table": len(header) == MAX_HEADER_BYTES,
-        "separates its columns by semicolons or tabs: use commas, and points for decimals": len(names) == 1
+        f"separates its columns by semicolons or tabs: use commas, and points for decimals{_IMPORT}": len(names) == 1
         and len(re.split("[;\t]", text)) > 1,
         "has no header: its first row must name the columns": all(_NUMBER.fullmatch(name) for name in names),
     }
