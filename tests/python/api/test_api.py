@@ -147,6 +147,18 @@ def test_kinds_of_columns(table):
             ctcr.read(wrong)
 
 
+def test_column_in_the_index(table):
+    """A column of the format that is the index is not lost without a word."""
+    pytest.importorskip("pandas")
+    frame = table.to_frame()
+    for names in (["t_s"], ["run", "t_s"]):
+        with pytest.raises(ctcr.InputError, match=f"row 1, {names[0]}: is the index.* reset_index") as caught:
+            ctcr.read(frame.set_index(names))
+        assert [problem.field for problem in caught.value.problems] == names
+    for allowed in (frame.set_index(["t_s"], drop=False), frame.rename_axis("row")):
+        assert len(ctcr.read(allowed)) == len(frame)
+
+
 def test_without_pandas(table, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ctcr.InputError, match="needs pandas"):

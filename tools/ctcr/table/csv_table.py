@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, ClassVar
 
 import numpy as np
 
@@ -74,6 +74,7 @@ class NumberTable:
     n_rows: int
     start: int
     end: int
+    index: ClassVar[tuple[str, ...]] = ()  # names of what a DataFrame holds beside its columns
 
     def blocks(self, faults: Faults) -> Iterator[tuple[Integers, Array, int]]:
         """Blocks of rows: (row numbers, numbers (rows, columns), bytes read). Unreadable rows go to `faults`."""

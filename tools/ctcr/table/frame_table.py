@@ -24,6 +24,7 @@ class FrameTable:
             raise InputError(Problem(f"a table is the path of a file or a DataFrame, not a value of type {kind}"))
         self._frame = frame
         self.columns, self.n_rows = tuple(str(name) for name in frame.columns), len(frame)
+        self.index = tuple(str(name) for name in getattr(getattr(frame, "index", None), "names", ()))
         self.end = self.n_rows
         if not self.n_rows:
             raise InputError(Problem("has no rows", NAME))

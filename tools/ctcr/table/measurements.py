@@ -261,6 +261,9 @@ def _groups(table: Table, n_tubes: int) -> dict[str, list[int]]:
     unknown = {column: _unknown(column, table.columns, n_tubes) for column in table.columns}
     meant = {near for _, near in unknown.values()}
     missing = {column: text for column, text in _missing(table.columns, groups, n_tubes) if column not in meant}
+    known = {name for names in groups.values() for name in names}
+    index = [name for name in table.index if name in known and name not in table.columns]
+    missing |= {name: "is the index of the rows: reset_index() makes a column of it" for name in index}
     faults = {column or "(no name)": text for column, (text, _) in unknown.items() if text} | missing
     if faults:
         problems = [Problem(text, file, 1, column, line_name="row") for column, text in faults.items()]
