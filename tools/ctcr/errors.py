@@ -55,8 +55,8 @@ def suggestion(name: str, choices: Iterable[str], otherwise: str) -> str:
 
 
 def shown(value: object) -> str:
-    """A value as an error shows it: short, on one line."""
-    text = repr(value)
+    """A value as an error shows it: short, on one line, as people write it; text in quotes."""
+    text = repr(value) if isinstance(value, str | bytes) else " ".join(str(value).split())
     return text if len(text) <= 40 else text[:36] + " ..."
 
 

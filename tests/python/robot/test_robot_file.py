@@ -58,6 +58,12 @@ def test_a_key_that_is_no_text_is_a_fault(name, key):
     assert faults(re.sub(rf"\b{name}:", f"{key}:", TEXT, count=1))
 
 
+def test_a_date_for_a_name():
+    """A value is shown as the file has it, not as Python calls it."""
+    (problem,) = faults(re.sub(r"name: \w+", "name: 2026-01-01", TEXT, count=1))
+    assert problem.message.startswith("2026-01-01 does not fit: needs text")
+
+
 def test_bending_stiffness():
     """A given bending stiffness replaces modulus and diameters."""
     lines = [line for line in TEXT.splitlines() if "diameter_mm" not in line and "density" not in line]
