@@ -91,6 +91,19 @@ def test_notices(robot, plan):
     assert added.held_out == "one of every four blocks of time" and np.isfinite(added.rms("rms_mm")["delay"])
 
 
+def test_no_smaller_held_out_error(robot, plan, hidden):
+    """An effect with which held-out runs are predicted no better is named with both errors, and only such a one."""
+    made = simulation.simulate(hidden(robot, backlash_rotation="0.02,0.02,0.02"), plan, "jitter", seed=1)
+    ids = ["backlash_rotation", "field_distortion", "creep"]
+    added = add.add(robot, made, ids, free=CALIBRATION)
+    rms = list(added.rms("rms_mm").values())[1:]
+    worse = [k for k, identity in enumerate(ids) if rms[k + 1] >= rms[k]]
+    assert worse and 0 not in worse
+    for k, identity in enumerate(ids):
+        text = f"{identity} does not lower the error on held-out readings: {rms[k]:.3f} mm without it, {rms[k + 1]:.3f}"
+        assert any(notice.startswith(text) for notice in added.notices) == (k in worse)
+
+
 def test_fitted_on_terminal(capsys):
     """All parameters of a small effect are shown; of a field of many terms the clearest, and how many are not."""
     field = catalogue.get("field_distortion", 3)

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -189,8 +190,9 @@ def add(
     if (smooth := smooth_field.likeliest_noise(stage.engine, fit)) is not None:
         nuisances.append(smooth_field.message(smooth))
     fit = lags.widened(stage.engine, one_sided.widened(fit))
+    useless = _not_lowered(stages[1:]) if held_out.any() else []
     stages.append(Stage("noise_floor", *joint.tracker_error(fit, fit.noise)))
-    notices = [*map(sentence, said), *about_outliers, *_notices(robot, fit, ids, explained), *nuisances]
+    notices = [*map(sentence, said), *about_outliers, *useless, *_notices(robot, fit, ids, explained), *nuisances]
     after, name = fit.apply(stage.robot), folds.named(readings, held_out)
     floor = floors(robot.with_effects(after.effects), given)
     after = placed(after, readings.sessions)
@@ -338,6 +340,16 @@ class _Fitter:
         fit = self.engine.fit(own, start=first, near=True, tolerance=settings.COARSE)
         fits = [fit, *(self.engine.fit_like(fit, own, other, tolerance=settings.COARSE) for other in others)]
         return values_of(max(fits, key=lambda tried: tried.log_evidence))
+
+
+def _not_lowered(stages: Sequence[Stage]) -> list[str]:
+    """The effects with which the error on held-out readings is no smaller than at the stage before."""
+    return [
+        f"{after.name} does not lower the error on held-out readings: {before.rms_mm:.3f} mm without it, "
+        f"{after.rms_mm:.3f} mm with it."
+        for before, after in pairwise(stages)
+        if after.rms_mm >= before.rms_mm
+    ]
 
 
 def _notices(robot: Robot, fit: joint.Fit, ids: Sequence[str], explained: bool) -> list[str]:
