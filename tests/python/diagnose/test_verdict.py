@@ -97,6 +97,15 @@ def test_implausible_final_values(tip_load):
     assert "effects.tip_load.mass = 70 kg" in replace(tip_load, final=replace(final, values=heavy)).in_doubt[0]
 
 
+def test_predicts_no_better(tip_load):
+    """Where effects do not lower the error on held-out readings, both errors are said beside the verdict."""
+    exchanged = replace(tip_load, calibrated=tip_load.with_effects, with_effects=tip_load.calibrated)
+    (said,), errors = exchanged.in_doubt, exchanged.rms_mm
+    assert said.startswith("Held-out readings are predicted no better for it: ")
+    assert f"{errors['calibrated']:.3f} mm without effects, {errors['with_effects']:.3f} mm with them" in said
+    assert tip_load.in_doubt == []
+
+
 @pytest.mark.parametrize("rejected", [True, False])
 def test_held_out_runs(tip_load, rejected):
     """The less effects explain of held-out runs, the less sure the verdict, and where they explain nothing they are not

@@ -105,10 +105,16 @@ class Diagnosis(Result):
 
     @property
     def in_doubt(self) -> list[str]:
-        """A sentence on fitted values of its effects that no real robot has, if there are any."""
+        """Sentences on fitted values of its effects that no real robot has, and on held-out readings that they do not
+        predict better, where it is so."""
         n = self.robot.n_tubes
         odd = [text for a in self.accepted for text in implausible_values(n, self.final, a.best.candidate)]
-        return [f"The data ask for implausible values: {listed(odd)}."] if odd else []
+        said = [f"The data ask for implausible values: {listed(odd)}."] if odd else []
+        without, beside = self.rms_mm["calibrated"], self.rms_mm["with_effects"]
+        if self.accepted and beside >= without:
+            errors = f"{without:.3f} mm without effects, {beside:.3f} mm with them"
+            said.append(f"Held-out readings are predicted no better for it: {errors}.")
+        return said
 
     @property
     def judged(self) -> Mask:
