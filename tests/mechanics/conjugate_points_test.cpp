@@ -100,22 +100,50 @@ TEST(Solve, FindsStableEquilibria) {
   EXPECT_GT(at_base, 10);
 }
 
-TEST(ConjugatePoints, ColumnBucklesAtEulersLoad) {
-  // Clamped at the plate, pushed at the free end: each of two bending directions has cos(sqrt(F/EI) L), which vanishes
-  // at F = (pi/2)^2 EI / L^2. Both at once only touch zero.
+/// Clamped at the plate, pushed at the free end: it buckles at F = (pi/2)^2 EI / L^2.
+struct Column {
+  static constexpr double quarter = std::numbers::pi / 2, length = 0.2;
   Robot<1> robot;
-  robot.tubes[0] = test::paper_robot().tubes[0];
-  robot.tubes[0].curvature = 0;
-  constexpr double length = 0.2;
   Joints<1> q;
-  q.beta << length - robot.tubes[0].length;
-  const double quarter = std::numbers::pi / 2, EI = robot.tubes[0].EI();
-  const double euler = quarter * quarter * EI / (length * length);
+  double euler;  ///< [N]
+
+  Column() {
+    robot.tubes[0] = test::paper_robot().tubes[0];
+    robot.tubes[0].curvature = 0;
+    q.beta << length - robot.tubes[0].length;
+    euler = quarter * quarter * robot.tubes[0].EI() / (length * length);
+  }
+  [[nodiscard]] TipLoad push(double part) const { return {.force = Vec3(0, 0, -part * euler), .moment = Vec3::Zero()}; }
+};
+
+TEST(ConjugatePoints, ColumnBucklesAtEulersLoad) {
+  // Each of two bending directions has cos(sqrt(F/EI) L). Both at once only touch zero.
+  const Column column;
   for (const double part : {0.1, 0.5, 0.9, 0.98, 1.0, 1.3}) {
-    const TipLoad push{.force = Vec3(0, 0, -part * euler), .moment = Vec3::Zero()};
-    const auto smallest = test::smallest_determinant(Model<1>(robot), q, push, Workspace<1>{}, 64);
-    const double cosine = part < 1 ? std::cos(std::sqrt(part) * quarter) : 0;
+    const auto smallest =
+        test::smallest_determinant(Model<1>(column.robot), column.q, column.push(part), Workspace<1>{}, 64);
+    const double cosine = part < 1 ? std::cos(std::sqrt(part) * Column::quarter) : 0;
     EXPECT_NEAR(smallest.value, cosine * cosine, 2e-4) << part;
+  }
+}
+
+/// Pushed in steps that are too small for a solve to look for conjugate points in each.
+TEST(Solve, ColumnIsNotOkBeyondEulersLoad) {
+  const Column column;
+  const Model<1> model(column.robot);
+  for (const bool in_control_steps : {false, true}) {
+    Workspace<1> ws;
+    Solution<1> solution;
+    for (double part = 0; part < 1.5; part += 1e-3) {
+      Status status = Status::needs_solve;
+      if (in_control_steps) status = step(model, column.q, column.push(part), ws, solution);
+      if (status == Status::needs_solve) status = solve(model, column.q, column.push(part), ws, solution);
+      if (part < 0.8) {
+        ASSERT_EQ(status, Status::ok) << part;
+      } else if (part > 1) {
+        ASSERT_NE(status, Status::ok) << part;
+      }
+    }
   }
 }
 

@@ -42,14 +42,15 @@ struct WarmStart {
   TipGuess<N> guess;
   Joints<N> q;  ///< joints and load that the guess belongs to
   TipLoad load;
-  bool stable = false;  ///< whether the guess describes a stable equilibrium
+  bool stable = false;  ///< whether the guess describes a stable equilibrium that is not about to snap
   Steps<N> steps;       ///< integration steps that the guess belongs to
   /// Error of the tip position by these steps [m], and how far the robot has moved since it was found: turns of the tip
   /// and of the tubes [rad], travel as a part of the robot's length.
   double integration_error = std::numeric_limits<double>::infinity(), moved = 0;
 };
 
-/// Scratch and warm start of one thread. Reused from call to call; nothing is allocated.
+/// Scratch and warm start of one thread. Reused from call to call; nothing is allocated. reset() it before it serves another
+/// robot, which may be unstable where this one is stable.
 template <int N>
 struct Workspace : WarmStart<N> {
   bool warm = false;          ///< whether the guess may be used

@@ -12,7 +12,8 @@ namespace detail {
 
 /// The largest step that Newton's method may take at once [rad].
 inline constexpr double step_limit = 1.0;
-/// det B_u below which an equilibrium counts as about to snap.
+/// det B_u below which an equilibrium counts as about to snap. What comes after it has its stability examined anew: where
+/// a robot buckles to all sides alike, two conjugate points come at once, and det B_u only touches 0.
 inline constexpr double singular_det = 1e-2;
 /// Evaluations after which an attempt is given up: where Newton's method converges at all, it does so within them. More
 /// patience finds no more equilibria of random robots, but leaves less to other starts.
@@ -377,7 +378,7 @@ inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipL
   out.kept_branch = ws.stable && stable && lies_on_branch(predicted, guess, ev.det);
   ws.steps = steps;
   ws.moved = moved;
-  ws.stable = stable;
+  ws.stable = stable && ev.det >= singular_det;
   out.integration_error = ws.integration_error = error;
   if (!solved()) {
     ws.reset();
@@ -444,6 +445,7 @@ inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLo
   out.integration_error = ws.integration_error = error;
   ws.steps = steps;
   ws.moved = way;
+  ws.stable = ev.det >= singular_det;
   return ev.det < singular_det ? Status::singular : Status::ok;
 }
 
