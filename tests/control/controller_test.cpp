@@ -117,6 +117,21 @@ TEST(Controller, SettingsThatMeanNothingAreRefused) {
   expect_refused({.beta_high = Vec3(std::nan(""), 0, 0)}, period);
   expect_refused({}, 0);
   expect_refused({}, HUGE_VAL);
+  expect_refused({.base_gap = 0.2}, period);  // allows no joints at all
+  expect_refused({.beta_low = Vec3(-0.1, -1, -1), .beta_high = Vec3(-0.2, 0, 0)}, period);
+  loop.system.sensor.tube = 1;
+  expect_refused({}, period);
+}
+
+TEST(Controller, ARobotThatCannotExistIsRefusedAsSuch) {
+  const Loop loop;
+  Robot<3> robot = loop.system.model.robot();
+  robot.tubes[0].length = 0;
+  Controller<3> controller({loop.system.transmission, Model<3>(robot), loop.system.sensor}, {}, period);
+  MotorAngles<3> v{Vec3::Ones(), Vec3::Ones()};
+  EXPECT_EQ(controller.check_start(loop.start), Status::invalid_robot);
+  EXPECT_EQ(controller.advance({loop.start, {}}, {}, {}, v).status, Status::invalid_robot);
+  EXPECT_EQ(v.translation.norm() + v.rotation.norm(), 0);
 }
 
 /// NaN anywhere is not near a bifurcation, and no robot moves by it.
@@ -271,11 +286,9 @@ TEST(Controller, ALoopWithoutAPeriodOrAPathDoesNotBegin) {
 
 TEST(Controller, LimitsThatExcludeTheStartAreRefused) {
   Loop loop;
-  const Controller<3> wide(loop.system, {}, period), narrow(loop.system, {.base_gap = 0.09}, period),
-      none(loop.system, {.base_gap = 0.2}, period);
+  const Controller<3> wide(loop.system, {}, period), narrow(loop.system, {.base_gap = 0.09}, period);
   EXPECT_EQ(wide.check_start(loop.start), Status::ok);
   EXPECT_EQ(narrow.check_start(loop.start), Status::joints_out_of_order);
-  EXPECT_EQ(none.check_start(loop.start), Status::joints_out_of_order);
 }
 
 /// On the way to a reference out of reach it keeps its limits and reports them.

@@ -53,22 +53,23 @@ public:
   double reading_age = 0;
 
   /// @param system  the sensor sits on the innermost tube   @param period  of the calls [s], > 0
-  /// Settings that mean nothing (check_limits(), the period) are answered by invalid_settings in all calls.
+  /// A robot that cannot exist is answered by invalid_robot in all calls, and settings that mean nothing by
+  /// invalid_settings: check_limits(), limits that allow no joints at all, the period, a sensor on another tube.
   Controller(const System<N, Fx>& system, const Limits<N>& limits, double period, const Tasks& wanted = {}) noexcept
     : tasks(wanted),
       system_(system),
       limits_(limits),
       allowed_(system.model.robot(), limits),
       period_(period),
-      settings_(period > 0 && period < HUGE_VAL ? check_limits(limits) : Status::invalid_settings),
+      settings_(check_settings()),
       now_{LiveEffects<N, Fx>(system.model), system.model, {}, {}} {}
 
   /// Whether the robot may be controlled from these motor angles.
-  /// @return ok; invalid_settings; joints_out_of_order: the limits exclude them, or allow no joints at all; else as solve()
+  /// @return ok; invalid_settings; joints_out_of_order: the limits exclude them; else as solve()
   [[nodiscard]] Status check_start(const MotorAngles<N>& theta) const noexcept {
     if (settings_ != Status::ok) return settings_;
     const Joints<N> q = joints(system_.transmission, theta);
-    if (!allowed_.exist() || !allowed_.contain(q.beta)) return Status::joints_out_of_order;
+    if (!allowed_.contain(q.beta)) return Status::joints_out_of_order;
     Workspace<N> ws;
     Solution<N> solution;
     return solve<Derivatives::jacobian>(system_.model, q, TipLoad{}, ws, solution, system_.settings);
@@ -157,6 +158,13 @@ private:
     Solution<N> solution;
   };
 
+  [[nodiscard]] Status check_settings() const noexcept {
+    if (system_.model.check() != Status::ok) return system_.model.check();
+    const bool possible = period_ > 0 && period_ < HUGE_VAL && system_.sensor.tube == 0 &&
+                          check_limits(limits_) == Status::ok && allowed_.exist();
+    return possible ? Status::ok : Status::invalid_settings;
+  }
+
   /// Moves on to the joints of the motors; returns those of the tubes.
   template <Derivatives D>
   Joints<N> settle(Moving& to, const Joints<N>& motors, const TipLoad& load) const noexcept {
@@ -215,7 +223,7 @@ private:
   Limits<N> limits_;
   AllowedPositions<N> allowed_;
   double period_, time_ = 0;
-  Status settings_;  ///< whether limits and period mean something
+  Status settings_;  ///< whether the robot can exist, and sensor, limits and period mean something
   Moving now_;
   std::array<Vec3, 9> past_{};  ///< positions of the model's tip, the newest first
   std::size_t count_ = 0;       ///< of those that are known
