@@ -76,8 +76,9 @@ public:
   }
 
   /// One period.
-  /// @param measured   motor angles and tracker reading (its rotation counts where orientation is tracked)
-  /// @param reference  wanted pose and velocity of the sensor, base frame
+  /// @param measured   motor angles and tracker reading (its rotation counts where orientation is tracked, or the sensor
+  ///                   sits beside the tip)
+  /// @param reference  wanted pose and velocity of the tip, base frame
   /// @param load       at the robot tip; only its moment counts unless the force is known
   /// @param velocity   of the motors [rad/s], finite; 0 unless the status is ok
   /// @return status ok; that of the model: singular: it is about to snap, and its Jacobian leads nowhere; singular: the
