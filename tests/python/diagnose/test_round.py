@@ -15,6 +15,7 @@ from ctcr.effects import catalogue
 from ctcr.effects.catalogue import get
 from ctcr.model import simulation
 from ctcr.model.noise import noise_of_readings
+from hidden_sessions import measured
 
 MASS = "effects.tip_load.mass"
 SPREAD = "effects.delay.spread"
@@ -74,6 +75,15 @@ def test_free_shape(robot, plan):
     held = engine.fit_like(before, screened[0].candidate.names)
     assert set(one.candidate.names) > set(screened[0].candidate.names)
     assert one.fit.log_evidence > held.log_evidence + settings.DECISIVE
+
+
+def test_impossible_values(robot):
+    """A surface pushes: where it would have to pull, another one that pushes takes part, or none."""
+    pushed = measured(robot, np.random.default_rng(1), {"effects.tip_load.force_x": 0.01})
+    engine = Engine(robot, pushed, noise_of_readings(robot, pushed), np.ones(len(pushed), bool))
+    screened = rounds.screen(engine, engine.fit(), pool(engine, "contact"), {})
+    assert max(one.linear for one in screened) > settings.DECISIVE
+    assert all((one.gain.values >= 0).all() for one in screened)
 
 
 def test_best_of_few_rows(robot, plan, monkeypatch):

@@ -3,7 +3,7 @@
 Residuals and derivatives are whitened, parameters counted in units of their prior standard deviation.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_solve
@@ -21,6 +21,12 @@ class Gain:
     signal: Array  # (K,) change of the residual that calibration cannot imitate
     columns: Array  # (K, k) derivatives that calibration cannot imitate
     removed: float  # chi-square of residual and prior
+
+    @property
+    def at_neutral(self) -> "Gain":
+        """Of the same parameters where none may leave its neutral value: what they cost."""
+        none = {name: np.zeros_like(getattr(self, name)) for name in ("values", "calibration", "signal")}
+        return replace(self, log_evidence=self.log_evidence - 0.5 * self.removed, removed=0.0, **none)
 
 
 def laplace(information: Array, gradient: Array) -> tuple[Array, Array]:

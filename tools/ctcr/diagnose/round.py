@@ -209,13 +209,19 @@ def screen(
     def worth(columns: Array) -> float:
         return linear.gain(before.whiten(columns)).log_evidence
 
+    def gain_of(start: Candidate, columns: Array) -> Gain:
+        gain = linear.gain(before.whiten(columns))
+        neutral, _, low, high = engine.priors(start.names[: len(gain.values)])
+        blocked = np.where(gain.values < 0, neutral <= low, neutral >= high)
+        return gain.at_neutral if blocked.all() else gain
+
     by_force = by(forces) / engine.priors(forces)[1]
     found = []
     for candidate in candidates:
         at = fixed | dict(candidate.shape)
         own = engine.derivatives(before, candidate.names, at) if candidate.shape else by(candidate.names)
         for options in starts.options(engine, candidate, own, by_force, worth):
-            gains = [(linear.gain(before.whiten(columns)), start) for start, columns in options]
+            gains = [(gain_of(*option), option[0]) for option in options]
             if gains:
                 gain, start = max(gains, key=lambda pair: pair[0].log_evidence)
                 found.append(CandidateFit(start, gain))
