@@ -54,6 +54,24 @@ def test_unconverged_fit(weighted):
     assert max(one.score for one in round_.tried) < settings.DECISIVE
 
 
+@pytest.fixture
+def stuck(robot):
+    """An engine of readings without any effect, its calibration, and one that ended where it began."""
+    made = measured(robot, np.random.default_rng(1), {})
+    engine = Engine(robot, made, noise_of_readings(robot, made), np.ones(len(made), bool))
+    ended = engine.fit()
+    there = engine.fit_like(ended, [], {}, max_iterations=0)
+    assert ended.log_evidence - there.log_evidence > 20
+    return engine, ended, there
+
+
+def test_astray(stuck):
+    """A candidate whose fit goes astray from its linearised start is fitted from the values before."""
+    engine, _, there = stuck
+    (one,) = rounds.Refits(engine, there, {}).of_all(rounds.screen(engine, there, pool(engine, "softening"), {})[:1])
+    assert one.linear > 0 and one.score > 0
+
+
 def test_contenders_converge(weighted, monkeypatch):
     """A candidate that is slow to fit does not lose to one that is quick."""
     monkeypatch.setattr(settings, "FIRST_ITERATIONS", 1)

@@ -304,17 +304,21 @@ class Refits:
             "tolerance": settings.COARSE,
             "near": one.fit is not None,
         }
-        first = dict(candidate.shape) | values_of(one.fit) if one.fit else linearised_end(engine, before, one)
-        for start in (first, values_of(before)):
+        shape = dict(candidate.shape)
+        first = shape | values_of(one.fit) if one.fit else linearised_end(engine, before, one)
+        fits: list[joint.Fit] = []
+        for start in (first, values_of(before) | shape):
             try:
                 fit = engine.fit_like(before, [*effects_in(before), *candidate.names], start, **options)
             except joint.NoFit:
                 continue
             if not _is_always_touched(engine, fit, candidate):
-                break
-        else:
+                fits.append(fit)
+                if _cost(fit) <= _cost(before):  # else it went astray: where nothing acts, the fit before is reached
+                    break
+        if not fits:
             return replace(one, fit=None, refit=None)
-        return self._by(one, fit)
+        return self._by(one, min(fits, key=_cost))
 
     def _by(self, one: CandidateFit, fit: joint.Fit) -> CandidateFit:
         """What the candidate explains by a fit at the weights and noise of the fit before."""
@@ -325,6 +329,11 @@ class Refits:
         sd = 2 * np.sqrt(max(explained, 0.0) / max(before.unexplained, 1.0))
         implausible = tuple(implausible_values(self.engine.robot.n_tubes, fit, candidate))
         return replace(one, refit=refit, explained=explained, explained_sd=sd, fit=fit, implausible=implausible)
+
+
+def _cost(fit: joint.Fit) -> float:
+    """Chi-square of residual and prior under the noise of a fit."""
+    return float(fit.admitted_chi_square + fit.shift_square)
 
 
 def linearised_end(engine: Engine, before: joint.Fit, one: CandidateFit) -> dict[str, float]:
