@@ -72,6 +72,14 @@ def test_astray(stuck):
     assert one.linear > 0 and one.score > 0
 
 
+def test_calibration_from_elsewhere(stuck):
+    """What calibration alone gains from where the best candidate led is no gain of that candidate."""
+    engine, ended, there = stuck
+    round_ = rounds.run_round(engine, there, pool(engine, "tip_load", "softening"), [])
+    assert round_.accepted is None
+    assert round_.before.log_evidence == pytest.approx(ended.log_evidence, abs=1.0)
+
+
 def test_contenders_converge(weighted, monkeypatch):
     """A candidate that is slow to fit does not lose to one that is quick."""
     monkeypatch.setattr(settings, "FIRST_ITERATIONS", 1)

@@ -32,6 +32,18 @@ def selected(robot, hidden, *offered, seed=3):
     return before, chosen
 
 
+def test_better_calibration(robot):
+    """Where a round comes upon a better optimum of the calibration, the selection goes on from there."""
+    made = measured(robot, np.random.default_rng(1), {})
+    engine = Engine(robot, made, noise_of_readings(robot, made), np.ones(len(made), bool), tolerance=settings.COARSE)
+    chosen = Selection(engine)
+    ended = chosen.calibrate([], {})
+    chosen.fit = chosen.calibrated = engine.fit_like(ended, [], {}, max_iterations=0)
+    assert not chosen.take_one([c for c in candidates(robot, made)[0] if c.id in ("tip_load", "softening")])
+    assert chosen.calibrated is chosen.fit
+    assert chosen.fit.log_evidence == pytest.approx(ended.log_evidence, abs=settings.COARSE)
+
+
 @pytest.mark.parametrize("seed", [3, 4])
 def test_exchange(robot, seed, monkeypatch):
     """An effect that imitated the right one gives way to it, whatever was accepted in between."""

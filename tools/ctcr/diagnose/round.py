@@ -180,8 +180,7 @@ def run_round(
         known = replace(known, gain=lags.linearised(thin, at).gain(at.whiten(own)))
     chosen = refits.in_reach(contenders(known, screened) if known else worth_a_refit(screened))
     tried = refits.of_all(chosen, known)
-    if accepted:
-        before, tried = _without_candidate(engine, before, tried, names, fixed)
+    before, tried = _without_candidate(engine, before, tried, names, fixed)
     fitted = [one.candidate for one in tried]
     tried += [one for one in screened if one.candidate not in fitted]
     tried.sort(key=lambda one: (-one.score, -one.linear))
@@ -369,7 +368,7 @@ def _without_candidate(
     engine: Engine, before: joint.Fit, tried: list[CandidateFit], names: list[str], fixed: dict[str, float]
 ) -> tuple[joint.Fit, list[CandidateFit]]:
     """The fit before and the candidates, after a fit without the best candidate that begins where its fit ended: what
-    that gains as well is no gain of the candidate, but another optimum of the effects accepted before."""
+    that gains as well is no gain of the candidate, but another optimum of the calibration or of the effects before."""
     best = max((one for one in tried if one.fit), key=lambda one: one.score, default=None)
     if best is None:
         return before, tried

@@ -144,7 +144,7 @@ class Selection:
         if a.log_evidence < settings.DECISIVE:
             round_.reject(f"beside the others it gains only {a.log_evidence:.1f} in log evidence")
             there = replace(self, accepted=others)
-            there.fit = there.calibrate(there.fits, values_of(without))
+            there.fit = there.calibrate(there.fits, values_of(round_.before))
         elif round_.accepted is None:
             return False
         elif a.id in round_.ids:
@@ -178,14 +178,26 @@ class Selection:
 
     def _round(self, open_to: list[Candidate], surely: bool) -> Round:
         """A round before which no prior was widened for what one of its candidates may have done; where it accepts
-        nothing that is likelier than the wider priors, one with these."""
+        nothing that is likelier than the wider priors, one with these. Anew where it found a better optimum."""
         engine, fit = self.engine, self.fit
         before = engine.less_widened(fit, open_to, parameters_of(self.fits)[1])
         round_ = run_round(engine, before, open_to, self.fits, surely=surely)
         best = round_.accepted
-        if before is fit or (best and best.fit.log_evidence > fit.log_evidence + settings.DECISIVE):
-            return round_
-        return run_round(engine, fit, open_to, self.fits, surely=surely)
+        if before is not fit and not (best and best.fit.log_evidence > fit.log_evidence + settings.DECISIVE):
+            before, round_ = fit, run_round(engine, fit, open_to, self.fits, surely=surely)
+        if round_.before.log_evidence > before.log_evidence + settings.DECISIVE and self._goes_on_from(round_.before):
+            return self._round(open_to, surely)
+        return round_
+
+    def _goes_on_from(self, there: joint.Fit) -> bool:
+        """Takes another optimum of the same parameters, which a round came upon, if it is surely better."""
+        fit = self.calibrate(self.fits, values_of(there))
+        if fit.log_evidence < self.fit.log_evidence + settings.DECISIVE:
+            return False
+        self.fit = fit
+        if not self.accepted:
+            self.calibrated = fit
+        return True
 
     def _accept(self, round_: Round) -> None:
         """Adds the effect of a round in its best form."""
@@ -267,12 +279,11 @@ def select_effects(engine: Engine, pool: list[Candidate]) -> Selection:
     if few is not None:
         engine.progress("a part of the readings first")
         chosen.engine = coarse.part(few)
-        chosen.fit = chosen.calibrate([], {})
-        start_plain = values_of(chosen.fit)
+        chosen.calibrated = chosen.fit = chosen.calibrate([], {})
         more = float(np.sum(engine.fitted) / np.sum(few))
         chosen.grow(pool, more)
         chosen.revise(pool, more)
-        start = values_of(chosen.fit)
+        start_plain, start = values_of(chosen.calibrated), values_of(chosen.fit)
         from_home = chosen.engine.measurements.from_home
         coarse.measurements, chosen.engine = replace(coarse.measurements, from_home=from_home), coarse
     chosen.calibrated = chosen.fit = chosen.calibrate([], start_plain)
