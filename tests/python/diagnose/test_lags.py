@@ -82,6 +82,20 @@ def test_no_hysteresis(by_chance):
     assert lags.explained(engine, fit)[0] > settings.DECISIVE
 
 
+def test_scores_of_a_round(by_chance):
+    """Scores are log evidences over the fit before, lags included, also where that is a better one than at first."""
+    engine, fit = by_chance
+    early = engine.fit_like(fit, [DELAY], {}, max_iterations=1, near=False)
+    pool = [c for c in candidates(engine.robot, engine.measurements)[0] if c.id == "backlash_rotation"]
+    refits = rounds.Refits(engine, early, {})
+    before, tried = refits.without_best(refits.of_all(rounds.screen(engine, early, pool, {})[:1]))
+    assert before.log_evidence > early.log_evidence
+    of_before, (one,) = rounds.Judged.of(engine, before), tried
+    gained = rounds.Judged.of(engine, one.fit).log_evidence - of_before.log_evidence
+    assert one.score == pytest.approx(gained - one.candidate.penalty)
+    assert gained != pytest.approx(one.fit.log_evidence - before.log_evidence, abs=1.0)
+
+
 def test_single_readings(robot, recorded):
     """Lags of single readings are noise, as a parameter for each reading would be; nothing else explains them."""
     readings = late(robot, recorded, np.random.default_rng(7).random(len(recorded)) < 0.5)

@@ -180,7 +180,7 @@ def run_round(
         known = replace(known, gain=lags.linearised(thin, at).gain(at.whiten(own)))
     chosen = refits.in_reach(contenders(known, screened) if known else worth_a_refit(screened))
     tried = refits.of_all(chosen, known)
-    before, tried = _without_candidate(engine, before, tried, names, fixed)
+    before, tried = refits.without_best(tried)
     fitted = [one.candidate for one in tried]
     tried += [one for one in screened if one.candidate not in fitted]
     tried.sort(key=lambda one: (-one.score, -one.linear))
@@ -329,6 +329,21 @@ class Refits:
         implausible = tuple(implausible_values(self.engine.robot.n_tubes, fit, candidate))
         return replace(one, refit=refit, explained=explained, explained_sd=sd, fit=fit, implausible=implausible)
 
+    def without_best(self, tried: list[CandidateFit]) -> tuple[joint.Fit, list[CandidateFit]]:
+        """The fit before and the candidates, after a fit without the best candidate that begins where its fit ended:
+        what that gains as well is no gain of the candidate, but another optimum of the calibration or of the effects
+        before."""
+        best = max((one for one in tried if one.fit), key=lambda one: one.score, default=None)
+        if best is None:
+            return self.before, tried
+        engine, before = self.engine, self.before
+        start = values_of(best.fit)
+        there = engine.fit_like(before, effects_in(before), start, fixed=self.fixed, tolerance=settings.COARSE)
+        if there.log_evidence <= before.log_evidence:
+            return before, tried
+        over_there = Refits(engine, there, self.fixed)
+        return there, [over_there._by(one, one.fit) if one.fit else one for one in tried]
+
 
 def _cost(fit: joint.Fit) -> float:
     """Chi-square of residual and prior under the noise of a fit."""
@@ -362,28 +377,6 @@ def _is_always_touched(engine: Engine, fit: joint.Fit, candidate: Candidate) -> 
     distance, *direction = ((dict(candidate.shape) | values_of(fit))[name] for name in surface)
     outside = starts.heights(engine, *direction) < distance
     return bool(np.mean(outside[engine.fitted]) < 1 - max(settings.SURFACE_OUTSIDE))
-
-
-def _without_candidate(
-    engine: Engine, before: joint.Fit, tried: list[CandidateFit], names: list[str], fixed: dict[str, float]
-) -> tuple[joint.Fit, list[CandidateFit]]:
-    """The fit before and the candidates, after a fit without the best candidate that begins where its fit ended: what
-    that gains as well is no gain of the candidate, but another optimum of the calibration or of the effects before."""
-    best = max((one for one in tried if one.fit), key=lambda one: one.score, default=None)
-    if best is None:
-        return before, tried
-    there = engine.fit_like(before, names, values_of(best.fit), fixed=fixed, tolerance=settings.COARSE)
-    found = there.log_evidence - before.log_evidence
-    if found <= 0:
-        return before, tried
-
-    judged = Judged.of(engine, there)
-
-    def over_there(one: CandidateFit) -> CandidateFit:
-        explained = judged.fraction_explained(Judged.of(engine, one.fit), len(one.candidate.names))
-        return replace(one, refit=one.refit - found, explained=explained)
-
-    return there, [one if one.fit is None else over_there(one) for one in tried]
 
 
 def decide(
