@@ -96,7 +96,7 @@ PATH_STEP = {"alpha": 0.035, "beta": 1e-3}  # [rad], [m] over which the torsion 
 FEW_ROWS = 300  # rows of a first fit where there are twice as many: enough to find the basin of every parameter
 FEW_PART = 0.1  # of very many rows, fitted before all of them: its steps cost a tenth
 TOLERANCE = 0.02  # [log evidence] of a converged fit: far below what decides anything
-COARSE = 0.5  # [log evidence] tolerance of fits that only find a start, or tell models apart
+COARSE = 0.5  # [log evidence] tolerance of fits that only find a start, or tell models apart: less tells nothing
 ITERATIONS = 50  # by which a fit has converged, or never will
 STARTS = 3  # starts that are compared
 FRICTION_PATH_CHANGE = 0.005  # [rad] of relative torsion angle below which the friction path is solved
@@ -109,7 +109,6 @@ KINKED = ".curved_length"  # parameters in which chi-square has a kink: where th
 ONE_SIDED_WIDTH = 2.0  # [sd] at which the sides of a kink are judged
 ONE_SIDED_WIDEN = 1.5  # factor of the search along a side, and sd from which a side is flat over the symmetric one
 ONE_SIDED_UNSEEN = 0.99  # posterior over prior sd from which a curve may lie behind the plate altogether
-ONE_SIDED_GAIN = 0.5  # log evidence that a restart across a kink must gain
 
 SESSION_EXPLAINED = 0.25  # fraction of the unexplained chi-square that terms of each run must explain: less is physics
 SESSION_PRIOR_WIDER = 10.0  # prior sd of the frame and the homes of a run over that of the robot file's
@@ -138,8 +137,7 @@ HALVES_DRAWS, HALVES_SEED = 24, 1  # of the posterior: the RMS that noise gives 
 # ---- Diagnosis: evidence for an effect
 
 DECISIVE = 5.0  # log evidence that decides between two models: odds of 150 to 1
-TIE = 3.0  # log evidence below which candidates cannot be told apart: odds of 20 to 1
-SAME_FORM = 0.5  # log evidence below which the form of an effect with the fewest settings is taken: it means nothing
+TIE = 3.0  # log evidence below which candidates cannot be told apart, nor one from none: odds of 20 to 1
 SAME_SIGNAL = 0.95  # fraction of each other's signal that candidates imitate, from which data cannot tell them apart
 MAX_EFFECTS = 6  # more causes than that no session can tell apart
 
@@ -154,10 +152,9 @@ FIRST_ITERATIONS = 5  # of a refit: enough to see whether a candidate contends
 CONTENDS = 0.5  # gain over the best one, above which a refit goes on until it has converged
 IN_REACH = 0.8  # gain over the best one on a part of many rows, below which a candidate is not refitted to all
 INFLATION_EXPLAINED = 1.2  # inflation of the noise beyond which the model certainly does not explain the readings
-INFLATION_SOUND = 1.05  # inflation up to which it explains them as it is
 INFLATION_WRONG = 3.0  # inflation from which the form of an effect is hardly right: other laws and amplitudes are tried
 LOST_TO_OUTLIERS = 10.0  # log evidence by which a fit with new weights may be worse before it has lost the effect
-HOPELESS = 1.0  # log evidence lost per number read, as by three times the mean square error: such a law is not followed
+INFLATION_SOUND = 1.05  # inflation up to which it explains them as it is
 NOISE_BETTER = 0.95  # RMS error of left-out runs over the usual one, at which another noise is used for prediction,
 NOISE_MUCH_BETTER = 0.9  # ... and where the model explains the readings as it is
 
@@ -173,7 +170,6 @@ SOURCE_DIRECTIONS = 48  # in which a source is tried: 30 deg apart
 SOURCE_FAR = 0.95  # quantile of the distances from that centre that far readings have
 SOURCE_STARTS, SOURCE_EVALUATIONS = 3, 150  # simplex searches for a source, and evaluations of each
 SOURCE_SIMPLEX = (0.2, 0.5)  # its edges: position over the distance of far readings, coils over their prior sd
-SOURCE_EVIDENCE = 3.0  # log evidence of the best position of the grid, below which no better one is searched for
 ADDED_STARTS = 2  # starts of an effect that `ctcr add` tries, with and without outliers
 
 # ---- Diagnosis: nuisance errors that no robot file can hold
@@ -217,7 +213,6 @@ SURE = 0.9  # probability from which effects are called identified
 
 TURNS = 2  # quarters that are held out in turn where nothing was found and the held-out one has new errors
 MOST_UNCERTAIN = 1.5  # expected square error of a held-out run over that of fitted ones, above which it judges nothing
-RUN_UNEXPLAINED = 1.0  # chi-square beyond noise over that of noise, from which a run says how much effects explain
 VARYING_ROWS = 400  # rows of the model where there are twice as many or more
 VARYING_MOST = 4  # variations, one found after the other
 VARYING_EXPLAINED = 0.3  # that all variations must explain together

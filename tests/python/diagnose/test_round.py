@@ -207,7 +207,7 @@ def test_hopeless():
 
 def test_simplest_form():
     """Of forms that are equally likely the one with the fewest settings is taken, else the likeliest."""
-    for better, shape in ((0.4 * settings.SAME_FORM, ()), (2 * settings.SAME_FORM, ((SPREAD, 0.5),))):
+    for better, shape in ((0.4 * settings.COARSE, ()), (2 * settings.COARSE, ((SPREAD, 0.5),))):
         plain, spread = candidate_fit("delay", 100.0), candidate_fit("delay", 100.0 + better, shape=((SPREAD, 0.5),))
         round_ = decided(plain, spread, candidate_fit("tip_load", 20.0))
         assert round_.accepted.candidate.shape == shape and round_.ids == ["delay"]

@@ -108,7 +108,7 @@ def explained_by_run(engine: Engine, before: joint.Fit, after: joint.Fit) -> dic
         rows = (group == k) & ~engine.rows & table.measured
         unexplained = unexplained_of(after, rows, positions_alone=True)
         to_explain = unexplained(before.residual)
-        if to_explain > 3 * settings.RUN_UNEXPLAINED * np.sum(rows):
+        if to_explain > 3 * np.sum(rows):  # as much as the noise leaves: less does not say how much effects explain
             run, lines = np.unique(table.run[rows]), table.row[rows]
             is_run = len(run) == 1 and not np.any((table.run == run[0]) & (group != k))
             name = f"run {run[0]}" if is_run else f"rows {lines.min()} to {lines.max()}"

@@ -283,7 +283,7 @@ class Refits:
         if one.fit is None or candidate == one.candidate:
             return [one]
         freed = self._of(replace(one, candidate=candidate), settings.FIRST_ITERATIONS)
-        return [freed, one] if freed.score > one.score + settings.SAME_FORM else [one]
+        return [freed, one] if freed.score > one.score + settings.COARSE else [one]
 
     def _converged(self, forms: list[CandidateFit], near: float) -> CandidateFit:
         """The first form with plausible values, or else the last one; fitted to convergence where it contends."""
@@ -399,7 +399,7 @@ def decide(
             round_.reason = f"the best candidate, {refitted[0].id}, would need an implausible value, {values}"
         return
     best = fitted[0]
-    its_forms = [one for one in fitted if one.id == best.id and best.score - one.score < settings.SAME_FORM]
+    its_forms = [one for one in fitted if one.id == best.id and best.score - one.score < settings.COARSE]
     best = min(its_forms, key=lambda one: len(one.candidate.shape))
     if best.score < threshold:
         round_.reason = (

@@ -127,7 +127,7 @@ def _source(engine: Engine, candidate: Candidate, worth: Worth) -> Option:
     tried = [np.append(metal, np.zeros(3)) for metal in around]
     costs = [cost(at) for at in tried]
     best = tried[int(np.argmin(costs))]
-    if min(costs) < -settings.SOURCE_EVIDENCE:
+    if min(costs) < -settings.TIE:
         edges = np.multiply(settings.SOURCE_SIMPLEX, (radius, sd[4]))
         steps = np.vstack([np.zeros(6), np.diag(np.repeat(edges, 3))])
         options = {"maxfev": settings.SOURCE_EVALUATIONS}

@@ -51,7 +51,7 @@ def restarted(fit: Fit, refit: Callable[[Array, Fit | None], Fit]) -> Fit:
     for i, name in enumerate(fit.names):
         if name.endswith(settings.KINKED) and fit.ratio[i] > settings.ONE_SIDED_UNSEEN:
             there = refit(fit.values - fit.prior_sd * np.eye(len(fit.values))[i], fit)
-            if there.log_evidence > fit.log_evidence + settings.ONE_SIDED_GAIN:
+            if there.log_evidence > fit.log_evidence + settings.COARSE:
                 fit = refit(there.values, None)
     return fit
 
