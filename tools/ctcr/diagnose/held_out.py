@@ -70,8 +70,7 @@ def _noise_that_predicts(engine: Engine, fit: joint.Fit) -> Any:
     errors = {part: typical(cross_validated(engine, fit, noise)) for part, noise in tried.items()}
     part = min(errors, key=lambda part: errors[part])
     usual = min(tried, key=lambda p: abs(tried[p].position_field - fit.noise.position_field))
-    needed = settings.NOISE_MUCH_BETTER if np.max(fit.inflation) < settings.INFLATION_SOUND else settings.NOISE_BETTER
-    return fit.noise if errors[part] > needed**2 * errors[usual] else tried[part]
+    return fit.noise if errors[part] > settings.NOISE_BETTER**2 * errors[usual] else tried[part]
 
 
 def unexplained_of(fit: joint.Fit, rows: Mask, *, positions_alone: bool = False) -> Callable[[Array], float]:
