@@ -67,6 +67,6 @@ def test_initial_history(engine, plan, from_home):
     noise = noise_of_readings(engine.robot, readings)
     taken = Engine(engine.robot, replace(readings, from_home=True), noise, np.ones(len(readings), bool))
     fit = taken.fit(play)
-    assert taken.revise_initial_history(fit, play) is not from_home
+    assert taken.revise_initial_history(fit) is not from_home
     assert taken.measurements.from_home is from_home
-    assert not taken.revise_initial_history(taken.fit(play), play)
+    assert not taken.revise_initial_history(taken.fit(play))

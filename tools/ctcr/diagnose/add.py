@@ -304,7 +304,7 @@ class _Fitter:
         own = [name for effect in known for name in effect.amplitudes if name not in self.fixed]
         own += [name for identity in shaped for name in self.shapes(identity)]
         likely = engine.fit_with_field(own, self._best(own, starts))
-        if any("order" in effect.needs for effect in known) and engine.revise_initial_history(likely, own):
+        if any("order" in effect.needs for effect in known) and engine.revise_initial_history(likely):
             likely = engine.fit_with_field(own, values_of(likely))
         self.explained = not joint.rejects(likely)
         # Values under the noise that predicts best, uncertainty under the likeliest noise.

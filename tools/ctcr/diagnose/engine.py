@@ -135,13 +135,11 @@ class Engine:
         options = {"fixed": fixed, "noise": fit.noise, "first_weights": fit.weights, "like": fit.model, "near": True}
         return self.fit(effects_in(fit), start=values_of(fit), **options)
 
-    def revise_initial_history(
-        self, fit: joint.Fit, added: Iterable[str], fixed: dict[str, float] | None = None
-    ) -> bool:
+    def revise_initial_history(self, fit: joint.Fit, fixed: dict[str, float] | None = None) -> bool:
         """Whether the readings say that the robot came to its first row otherwise than assumed: straight from home, or
         at rest there. If so, all later fits assume that."""
         other = replace(self, measurements=replace(self.measurements, from_home=not self.measurements.from_home))
-        there = other.fit_like(fit, added, fixed=fixed, tolerance=settings.COARSE)
+        there = other.fit_like(fit, effects_in(fit), fixed=fixed, tolerance=settings.COARSE)
         if there.log_evidence - fit.log_evidence < settings.DECISIVE:
             return False
         self.measurements = other.measurements

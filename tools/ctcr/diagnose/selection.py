@@ -214,7 +214,7 @@ class Selection:
         if self.fit.log_evidence < converged.log_evidence - settings.LOST_TO_OUTLIERS:
             self.fit = engine.fit_like(before, names, values_of(converged), fixed=fixed)
         needs_history = "order" in catalogue.get(one.id, engine.robot.n_tubes).needs
-        if needs_history and engine.revise_initial_history(self.fit, names, fixed):
+        if needs_history and engine.revise_initial_history(self.fit, fixed):
             self.fit = self.calibrate(self.fits, values_of(self.fit))
         self.refine_form(one)
         one.residual = self.fit.residual[:, :3]
