@@ -146,8 +146,8 @@ class Engine:
         return True
 
     def less_widened(self, fit: joint.Fit, candidates: Iterable[Candidate], fixed: dict[str, float]) -> joint.Fit:
-        """The fit with only those scales that the readings ask for even if the candidates act: a data sheet must not be
-        blamed for what an effect may have done."""
+        """The fit with those widened priors alone that the readings ask for even where the candidates act: the
+        uncertainties of a data sheet must not be widened for what an effect has done."""
         if not fit.priors.scales:
             return fit
         names = [name for name in dict.fromkeys(n for c in candidates for n in c.names) if name not in fit.names]

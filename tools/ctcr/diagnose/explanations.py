@@ -5,8 +5,9 @@ effects. Four likelihoods weigh them:
 
 - the log evidence of the joint fits. The form of an effect is known only to a part of its signal, so differences
   smaller than what an error of the form makes decide nothing: they are divided by 1 + form_error^2 times the evidence;
-- the amplitude that effects leave of the unexplained signal of held-out runs: half-normal with a standard deviation of
-  the form error of the effects if nothing else acts, uniform if something does;
+- the amplitude that effects leave of the unexplained signal of held-out runs, none where noise explains the residual of
+  the fitted ones: half-normal with a standard deviation of the form error of the effects if nothing else acts, uniform
+  if something does;
 - the share that an effect explains of what was left before it: likely large for a cause that stands alone (density
   2 s), any for one beside others, likely small for an imitation (2 (1 - s)), and exponential for one that only mends
   the forms of the others. Their form error is its scale: the less exact they are, the more of what they leave may

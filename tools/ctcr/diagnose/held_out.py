@@ -76,9 +76,9 @@ def _noise_that_predicts(engine: Engine, fit: joint.Fit) -> Any:
 def unexplained_of(fit: joint.Fit, rows: Mask, *, positions_alone: bool = False) -> Callable[[Array], float]:
     """The unexplained chi-square of a residual (M, 6) in some rows (M,) that were not fitted, as a function of it.
 
-    In units of the noise as stated, the tracker's smooth error included: where that is large, millimetres say little.
-    The uncertainty of the fitted parameters counts as explained. Outliers of the fit, the better the model, count for
-    little.
+    Its unit is the noise as stated, the tracker's smooth error included: where that is large, millimetres say little.
+    What the uncertainty of the fitted parameters explains does not count. Readings that are outliers of `fit` count
+    for little, so `fit` should be the better one of the fits that are compared.
     """
     weights = joint.linear_fit(fit, only=rows, max_iterations=0).weights.copy()
     if positions_alone:

@@ -68,10 +68,11 @@ def messages(robot: Robot, measurements: Measurements, fit: Any, isolated: Mask)
 
 
 def clustered(measurements: Measurements, fit: Any) -> Mask:
-    """Fitted rows (M,) that are outliers in the same direction as the reading nearest in joints and load, or even by
-    the same error but for noise; none where so many may be so by chance, as outliers of a tracker are.
+    """Fitted rows (M,) that are outliers like the reading nearest in joints and load: their errors point in the same
+    direction, or are equal but for noise. None where the outliers of a tracker may agree so often by chance.
 
-    Outliers are those that the fit down-weights, not readings with the error that its model has everywhere.
+    An outlier here is a reading that the fit down-weights. A reading with the error that the model has everywhere is
+    none.
     """
     fitted = fit.weights[:, 0] > 0
     down_weighted = fitted & (fit.weights[:, 0] < settings.OUTLIER_WEIGHT)

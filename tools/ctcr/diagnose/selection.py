@@ -177,8 +177,13 @@ class Selection:
             a.residual = fit.residual[:, :3]
 
     def _round(self, open_to: list[Candidate], surely: bool) -> Round:
-        """A round before which no prior was widened for what one of its candidates may have done; where it accepts
-        nothing that is likelier than the wider priors, one with these. Anew where it found a better optimum."""
+        """The round that decides on the next effect.
+
+        The fit before may have widened priors for what one of the candidates has done. So a first round begins without
+        these widenings (Engine.less_widened). If it accepts nothing that is decisively likelier than the widened
+        priors, a second round begins with them. If the round found a better optimum of the fit before, the selection
+        goes on from there and runs the round again.
+        """
         engine, fit = self.engine, self.fit
         before = engine.less_widened(fit, open_to, parameters_of(self.fits)[1])
         round_ = run_round(engine, before, open_to, self.fits, surely=surely)
@@ -307,8 +312,11 @@ def select_effects(engine: Engine, pool: list[Candidate]) -> Selection:
 def _best_of_each_law(
     tried: list[tuple[CandidateFit, joint.Fit]], fit: joint.Fit
 ) -> list[tuple[CandidateFit, joint.Fit]]:
-    """The best form alone; or that of each constitutive law, the best first, where the noise of the fit before is so
-    inflated that its law must be wrong: in such noise laws can hardly be told apart, but for hopeless ones."""
+    """The forms that are calibrated anew, the best first: the best one alone, or the best of each constitutive law.
+
+    Several laws are kept where the noise of the fit before is so inflated that its law must be wrong. Evidences under
+    such noise hardly tell laws apart; only hopeless ones are left out.
+    """
     tried = sorted(tried, key=lambda pair: -pair[1].log_evidence)
     if np.max(fit.inflation) <= settings.INFLATION_WRONG:
         return tried[:1]
