@@ -153,7 +153,6 @@ CONTENDS = 0.5  # gain over the best one, above which a refit goes on until it h
 IN_REACH = 0.8  # gain over the best one on a part of many rows, below which a candidate is not refitted to all
 INFLATION_EXPLAINED = 1.2  # inflation of the noise beyond which the model certainly does not explain the readings
 INFLATION_WRONG = 3.0  # inflation from which the form of an effect is hardly right: other laws and amplitudes are tried
-LOST_TO_OUTLIERS = 10.0  # log evidence by which a fit with new weights may be worse before it has lost the effect
 NOISE_BETTER = 0.9  # RMS error of left-out runs over the usual one, at which another noise is used for prediction
 
 # ---- Diagnosis: searches for a start

@@ -216,7 +216,7 @@ class Selection:
         if not converged.converged:
             converged = engine.fit_like(before, names, values_of(converged), fixed=fixed)
         self.fit = self.calibrate(self.fits, values_of(converged))
-        if self.fit.log_evidence < converged.log_evidence - settings.LOST_TO_OUTLIERS:
+        if self.fit.log_evidence < converged.log_evidence - settings.DECISIVE:  # new weights have lost the effect
             self.fit = engine.fit_like(before, names, values_of(converged), fixed=fixed)
         needs_history = "order" in catalogue.get(one.id, engine.robot.n_tubes).needs
         if needs_history and engine.revise_initial_history(self.fit, fixed):
