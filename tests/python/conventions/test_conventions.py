@@ -130,6 +130,15 @@ def test_poses_of_other_rows(n_tubes):
     assert "wrong in another way" in found.unexplained
 
 
+@pytest.mark.parametrize("n_tubes", [2, 3])
+def test_positions_of_another_robot(n_tubes):
+    """Positions that have nothing to do with the joints are in no other unit, though smaller ones err by less."""
+    robot, readings = bench([7, n_tubes], n_tubes)
+    anywhere = np.random.default_rng(n_tubes).normal(0, 0.05, readings.position.shape)
+    found = review(robot, replace(readings, position=anywhere))
+    assert not found.findings and "wrong in another way" in found.unexplained
+
+
 def test_constant_orientation(files, run):
     """Quaternions that never change are no orientation."""
     robot, readings = bench(43)

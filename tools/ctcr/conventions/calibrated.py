@@ -23,6 +23,9 @@ class Calibrated:
     robot: Robot
     error: Array  # (K,) [m] distance of each reading from its prediction; NaN where the model has no solution
     floor: float  # [m] distance that jitter alone makes; 0: not stated
+    # Of the positions over those of the table. Errors compare in the unit of the table: those of positions made a
+    # thousand times smaller are smaller, but no likelier.
+    scale: float = 1.0
 
     @property
     def solved(self) -> Mask:
@@ -32,11 +35,16 @@ class Calibrated:
     def log_error(self) -> Array:
         """Logarithm of the error (K,), in which a few outliers weigh little; jitter bounds it below."""
         missed = np.where(self.solved, self.error, settings.CONVENTION_UNSOLVED)
-        return 0.5 * np.log(missed**2 + max(self.floor, settings.CONVENTION_FINEST) ** 2)
+        return 0.5 * np.log((missed / self.scale) ** 2 + self.jitter**2)
+
+    @property
+    def jitter(self) -> float:
+        """Size [m of the table] of the error that jitter makes."""
+        return max(self.floor, settings.CONVENTION_FINEST) / self.scale
 
     @property
     def typical(self) -> float:
-        """Geometric mean of the error [m]: what decides. Infinite where the model solves too few readings."""
+        """Geometric mean of the error [m of the table]: what decides. Infinite where the model solves too few rows."""
         return float(np.exp(self.log_error.mean())) if self.solved.mean() > settings.CONVENTION_SOLVED else np.inf
 
     def at(self, rows: Mask) -> "Calibrated":
@@ -45,15 +53,14 @@ class Calibrated:
 
     @property
     def beyond_jitter(self) -> float:
-        """The part [m] of the typical error that jitter does not make."""
+        """The part [m of the table] of the typical error that jitter does not make."""
         return float(self._beyond_jitter[0])
 
     @property
     def _beyond_jitter(self) -> Array:
-        """The part [m] that jitter does not make: of the typical error, and of the one that 90 % do not exceed."""
+        """The part [m of the table] that jitter does not make: typical, and of the error that 90 % do not exceed."""
         sizes = np.array([self.typical, np.exp(np.quantile(self.log_error, 0.9))])
-        jitter = np.array([JITTER_ALONE, MOST_JITTER]) * max(self.floor, settings.CONVENTION_FINEST)
-        return np.sqrt(np.maximum(sizes**2 - jitter**2, 0.0))
+        return np.sqrt(np.maximum(sizes**2 - (np.array([JITTER_ALONE, MOST_JITTER]) * self.jitter) ** 2, 0.0))
 
     def left_of(self, before: "Calibrated") -> Array:
         """The share that is left of the error beyond jitter: typical, and of 90 % of the readings."""
@@ -68,7 +75,7 @@ class Calibrated:
     @property
     def may_be_beaten(self) -> bool:
         """Whether it is more than jitter."""
-        return self._exceeds(JITTER_ALONE * max(self.floor, settings.CONVENTION_FINEST))
+        return self._exceeds(JITTER_ALONE * self.jitter)
 
     def _exceeds(self, typical: float) -> bool:
         """Whether the likelihood of a smaller typical error [m] outweighs the prior odds against a cause."""

@@ -44,6 +44,7 @@ class Hypothesis:
     sensor: Array | None = None  # (3,) [m] of the sensor in the frame of the tip instead of the file's
     # A home of another size: "alpha" or "beta", tube from 0, SI; of some runs also "curvature", by the logarithm.
     offset: tuple[str, int, float] | None = None
+    scale: float = 1.0  # of the positions that it makes, over those of the table
     doubts: int = 1  # how much is wrong by it: of two that explain the readings alike, the lesser is named
 
     @property
@@ -290,7 +291,7 @@ def _forces(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
 def _positions(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
     for unit, factor in OTHER_UNITS["position"]:
         text, fix = f"positions are in {unit}, not in m", f"ctcr import --unit position={unit}"
-        yield Hypothesis("position_unit", text, POSE, fix, changed("position", lambda p, f=factor: p * f))
+        yield Hypothesis("position_unit", text, POSE, fix, changed("position", lambda p, f=factor: p * f), scale=factor)
     for axis, name in enumerate("xyz"):
         sign = np.ones(3)
         sign[axis] = -1.0

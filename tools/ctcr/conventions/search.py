@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from math import prod
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -79,7 +80,7 @@ def corrected(robot: Robot, readings: Measurements, of_runs: Measurements) -> tu
         if not _of_one_session(case, better, of_runs):
             break
         found += _findings(case, better)
-        case = better.case
+        case = replace(better.case, fit=replace(better.case.fit, scale=1.0))
     left = case.fit.beyond_jitter
     # Runs need not share a frame: what each has of its own is told apart later.
     if case.share_of(left) >= settings.PHYSICS_LEAVES:
@@ -211,11 +212,11 @@ def _with_run_frames(case: Case, of_runs: Measurements) -> Calibrated:
         rows = of_runs.run == run
         if 3 * np.sum(rows) > FRAME:
             error[rows] = aligned(positions[rows], of_runs.position[rows])[2]
-    return Calibrated(case.robot, dearer(len(runs) * FRAME, len(of_runs)) * error, case.fit.floor)
+    return replace(case.fit, error=dearer(len(runs) * FRAME, len(of_runs)) * error)
 
 
 def _is_noise(fit: Calibrated) -> bool:
-    return fit.typical < settings.CONVENTION_AT_FLOOR * max(fit.floor, settings.CONVENTION_FINEST)
+    return fit.typical < settings.CONVENTION_AT_FLOOR * fit.jitter
 
 
 def _likely(case: Case) -> tuple[list[Wrong], list[Wrong]]:
@@ -240,8 +241,9 @@ def _likely(case: Case) -> tuple[list[Wrong], list[Wrong]]:
 
 
 def _looks(case: Case) -> Iterator[tuple[Wrong, Array]]:
-    """Median errors (2,) [m] before any calibration, in the file's frame and in the one that fits best: with no
-    hypothesis, with each, and with pairs, one at least of which is of the tracker; of these in the file's frame alone.
+    """Median errors (2,) [m of the table] before any calibration, in the file's frame and in the one that fits best:
+    with no hypothesis, with each, and with pairs, one at least of which is of the tracker; of these in the file's frame
+    alone.
 
     What the model does not solve is left out.
     """
@@ -262,7 +264,12 @@ def _looks(case: Case) -> Iterator[tuple[Wrong, Array]]:
             if moved not in free and (registers or len(own) + len(wrong) < 2):
                 free[moved] = np.nanmedian(aligned(predicted, readings.position)[2])
             here = free[moved] if registers else np.nanmedian(tips.errors(robot, readings, predicted))
-            yield own + wrong, np.array([here, free.get(moved, here)])
+            yield own + wrong, np.array([here, free.get(moved, here)]) / _scale(wrong)
+
+
+def _scale(wrong: Wrong) -> float:
+    """Of the positions under these hypotheses, over those of the table."""
+    return prod(one.scale for one in wrong)
 
 
 def _changed(case: Case, wrong: Wrong, readings: Measurements) -> tuple[Robot, Measurements]:
@@ -279,7 +286,8 @@ def _applied(case: Case, wrong: Wrong) -> Case:
         rotation, origin, _ = aligned(tips.predicted(robot, readings), readings.position)
         robot = with_frame(robot, rotation, origin)
     free = tuple(name for one in wrong for name in one.frees)
-    fit = calibrated(robot, readings, free=free, to_beat=case.fit.typical)
+    scale = _scale(wrong)
+    fit = replace(calibrated(robot, readings, free=free, to_beat=scale * case.fit.typical), scale=scale)
     return Case(robot, readings, fit, (*case.changes, *(one.change for one in wrong)))
 
 
