@@ -338,8 +338,11 @@ def test_rows_left_out():
         prediction.status[5] = status
         first = f"The model has no solution for 1 of 178 readings ({status_text(status)}: 1). {then}"
         assert headline(compare(robot, readings, prediction)).startswith(first)
+    prediction.status[:] = OUT_OF_ORDER
+    with pytest.raises(InputError, match="compared: 2 rows without .* its home, or its betas may be wrong"):
+        compare(robot, readings, prediction)
     readings.position[:] = np.nan
-    with pytest.raises(InputError, match="no row can be compared"):
+    with pytest.raises(InputError, match="no row can be compared: 180 rows without a measured position.$"):
         compare(robot, readings, prediction)
 
 

@@ -23,6 +23,7 @@ from ctcr.frames import rigid_motion
 from ctcr.model.model import Prediction
 from ctcr.robot.description import Robot
 from ctcr.show.result import Glance, Result, frame
+from ctcr.show.wording import counted
 from ctcr.table.measurements import Measurements
 
 if TYPE_CHECKING:
@@ -166,11 +167,9 @@ def compare(
     """
     sample = take_sample(robot, measurements, prediction)
     if len(sample.row) == 0:
-        text = (
-            f"no row can be compared: {len(sample.not_measured)} rows without a measured position, "
-            f"{len(sample.not_solved)} rows that the model does not solve"
-        )
-        raise InputError(Problem(text))
+        lacking = len(sample.not_measured)
+        why = [f"{counted(lacking, 'row')} without a measured position."] * bool(lacking)
+        raise InputError(Problem(" ".join(["no row can be compared:", *why, *sample.unsolved])))
     headline = sample
     if sessions:
         sample = _in_one_frame(sample)
