@@ -39,6 +39,8 @@ def test_named(robot):
     one = dataclasses.replace(table, run=np.zeros_like(table.run))
     assert named(one, held_out_rows(robot, one)) == "one of every four blocks of time"
     assert named(table, table.run < 0) == ""
+    many = dataclasses.replace(table, run=np.arange(len(table)))
+    assert named(many, many.run % 4 == 2) == f"{len(table) // 4} of {len(table)} runs"
 
 
 def test_no_alternation(robot):

@@ -18,7 +18,7 @@ from ctcr.errors import InputError, Problem
 from ctcr.model import parameters, user_recording
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot.description import Robot
-from ctcr.show.wording import runs_named
+from ctcr.show.wording import NAMED, runs_named
 from ctcr.table.measurements import Measurements
 
 
@@ -125,6 +125,8 @@ def named(measurements: Measurements, held_out: Mask) -> str:
     runs = np.unique(measurements.run[held_out])
     if np.isin(measurements.run[~held_out], runs).any():
         return "one of every four blocks of time"
+    if len(runs) > NAMED:
+        return f"{len(runs)} of {len(np.unique(measurements.run))} runs"
     return runs_named(runs)
 
 
