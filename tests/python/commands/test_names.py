@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from ctcr.robot import robot_file
-from ctcr.show import html_page
+from ctcr.show import style
 from ctcr.show.wording import visible
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
@@ -149,7 +149,7 @@ class Elements(HTMLParser):
 @pytest.mark.parametrize("command", [("compare",), ("calibrate", "fit", "--free", "tubes.1.curvature")])
 def test_report(run, robot, table, tmp_path, monkeypatch, command):
     """A report has the elements that it has with plain names."""
-    monkeypatch.setattr(html_page, "draw", lambda *_: "<svg/>")
+    monkeypatch.setattr(style, "draw", lambda *_: "<svg/>")
     plain, page = tmp_path / "plain.csv", tmp_path / "page.html"
     plain.write_bytes(table.read_bytes())
     elements = []
