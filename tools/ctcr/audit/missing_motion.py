@@ -34,7 +34,7 @@ def completed(robot: Robot, measurements: Measurements) -> tuple[Measurements, l
     size = np.sum(loop**2, axis=1)
     visible = (np.sqrt(size) > settings.VISITS_DIFFER * noise) & np.isfinite(p[here]).all(axis=1)
     nearer = (np.linalg.norm(p[here] - p[same], axis=1) - np.linalg.norm(p[here] - p[other], axis=1))[visible]
-    if 2 * np.count_nonzero(nearer > 0) <= len(nearer):  # as most tables: no test need be loaded
+    if 2 * np.count_nonzero(nearer > 0) <= len(nearer):  # the usual case needs no test
         return measurements, []
     if scipy.stats.wilcoxon(nearer, alternative="greater").pvalue > settings.SIGNIFICANCE:
         return measurements, []

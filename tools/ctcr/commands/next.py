@@ -72,7 +72,7 @@ def _show(out, n_tubes: int, verdict, proposal) -> None:
 
     if len(proposal.rivals) < 2:
         settled = verdict.word in ("identified", "nothing_missing")
-        why = "Nothing is open between effects" if settled else "No two effects are rivals, of which runs could decide"
+        why = "Nothing is open between effects" if settled else "No effects are open that runs could tell apart"
         out.say(f"{why}: the verdict on these measurements is {verdict.word.replace('_', ' ')}.")
         out.say(*([] if settled else verdict.sentences))
         return

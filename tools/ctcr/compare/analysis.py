@@ -168,7 +168,7 @@ def compare(
     sample = take_sample(robot, measurements, prediction)
     if len(sample.row) == 0:
         lacking = len(sample.not_measured)
-        why = [f"{counted(lacking, 'row')} without a measured position."] * bool(lacking)
+        why = [f"{counted(lacking, 'row')} without a measured position."] if lacking else []
         raise InputError(Problem(" ".join(["no row can be compared:", *why, *sample.unsolved])))
     headline = sample
     if sessions:

@@ -78,7 +78,7 @@ class Calibrated:
         return self._exceeds(JITTER_ALONE * self.jitter)
 
     def _exceeds(self, typical: float) -> bool:
-        """Whether the likelihood of a smaller typical error [m] outweighs the prior odds against a cause."""
+        """Whether the likelihood of a smaller typical error [m of the table] outweighs the odds against a cause."""
         return 3 * len(self.error) * np.log(self.typical / typical) > settings.DECISIVE + settings.CONVENTION_UNLIKELY
 
     @property

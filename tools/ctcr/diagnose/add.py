@@ -4,7 +4,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,7 +32,7 @@ from ctcr.robot import history, ledger
 from ctcr.robot.description import Robot
 from ctcr.robot.ledger import Change, Entry
 from ctcr.show.output import Progress
-from ctcr.show.result import Glance, Shown, frame
+from ctcr.show.result import Glance, Shown, frame, picture
 from ctcr.show.wording import deviation, number, sentence
 from ctcr.table.measurements import Measurements
 
@@ -108,9 +107,7 @@ class Added(Shown):
     def plot(self) -> "Picture":
         """The error after each step, a matplotlib figure; `savefig` writes it."""
         stages = [history.Stage(name, size, "") for name, size in self._errors()]
-        made = import_module("ctcr.show.style").picture(history.draw_waterfall, stages, 10.4, 4.4)
-        assert made is not None
-        return made
+        return picture(history.draw_waterfall, stages, 10.4, 4.4)
 
     def to_frame(self) -> "DataFrame":
         """A row a fitted parameter of an effect, SI."""

@@ -125,7 +125,7 @@ class Judged:
     @staticmethod
     def of(engine: Engine, fit: joint.Fit) -> "Judged":
         more, removed = lags.explained(engine, fit)
-        return Judged(fit, fit.log_evidence + more, fit.admitted_chi_square + fit.shift_square - removed)
+        return Judged(fit, fit.log_evidence + more, _cost(fit) - removed)
 
     @property
     def unexplained(self) -> float:

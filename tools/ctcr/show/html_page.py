@@ -101,9 +101,8 @@ def bullets(lines: Iterable[str]) -> str:
 
 def figure(plot: Any, subject: Any, width: float, height: float, caption: str, wide: bool = False) -> str:
     """A picture of `subject` with its caption; empty where there is nothing to draw."""
-    drawn = import_module("ctcr.show.style").draw(
-        plot, subject, width, height
-    )  # matplotlib loads where something is drawn
+    # matplotlib loads only where something is drawn.
+    drawn = import_module("ctcr.show.style").draw(plot, subject, width, height)
     kind = ' class="wide"' if wide else ""
     return f"<figure{kind}>{drawn}<figcaption>{as_html(caption)}</figcaption></figure>" if drawn else ""
 

@@ -69,10 +69,15 @@ class Result(Shown):
         """Its main picture, a matplotlib figure; `savefig` writes it."""
         module, function, width, height = self.PICTURE
         draw = getattr(import_module(f"ctcr.{module}"), function)
-        made = import_module("ctcr.show.style").picture(draw, self, width, height)
-        if made is None:
-            raise InputError(Problem("there is nothing to draw"))
-        return made
+        return picture(draw, self, width, height)
+
+
+def picture(draw: Any, subject: Any, width: float, height: float) -> Picture:
+    """A matplotlib figure, `width` by `height` inches. Raises InputError where there is nothing to draw."""
+    made = import_module("ctcr.show.style").picture(draw, subject, width, height)  # matplotlib loads only here
+    if made is None:
+        raise InputError(Problem("there is nothing to draw"))
+    return made
 
 
 def frame(columns: Mapping[str, Any]) -> DataFrame:
