@@ -44,6 +44,22 @@ def test_better_calibration(robot):
     assert chosen.fit.log_evidence == pytest.approx(ended.log_evidence, abs=settings.COARSE)
 
 
+def test_gain_that_does_not_last(robot):
+    """An effect whose gain in a round was an accident of where a fit began is not kept, and leaves no trace."""
+    made = measured(robot, np.random.default_rng(1), {})
+    engine = Engine(robot, made, noise_of_readings(robot, made), np.ones(len(made), bool), tolerance=settings.COARSE)
+    chosen = Selection(engine)
+    before = chosen.fit = chosen.calibrated = chosen.calibrate([], {})
+    round_ = run_round(engine, before, [c for c in candidates(robot, made)[0] if c.id == "tip_load"], [])
+    lucky = round_.tried[0]
+    fit = engine.fit_like(before, lucky.candidate.names)
+    round_.accepted, round_.ids = replace(lucky, fit=fit, refit=20.0), [lucky.id]
+    round_.tried = [round_.accepted]
+    assert not chosen._accept(round_)
+    assert chosen.fit is before and not chosen.accepted and not chosen.history
+    assert round_.tried[0].refit < settings.DECISIVE and "fitted to the end" in round_.why_not
+
+
 @pytest.mark.parametrize("seed", [3, 4])
 def test_exchange(robot, seed, monkeypatch):
     """An effect that imitated the right one gives way to it, whatever was accepted in between."""

@@ -94,11 +94,10 @@ class Selection:
             round_.reject(f"{beside}{best.id} more probably imitates a cause outside the catalogue")
         if more > 1 and not (round_.is_clear or round_.is_hopeless(more)):
             return False
-        if round_.accepted is None:
-            self.last = round_
-            return False
-        self._accept(round_)
-        return True
+        if round_.accepted and self._accept(round_):
+            return True
+        self.last = round_
+        return False
 
     def revise(self, pool: list[Candidate], more: float = 1.0) -> None:
         """Chooses each effect anew beside all the others, as long as that changes them: one that was accepted early was
@@ -204,9 +203,11 @@ class Selection:
             self.calibrated = fit
         return True
 
-    def _accept(self, round_: Round) -> None:
-        """Adds the effect of a round in its best form."""
+    def _accept(self, round_: Round) -> bool:
+        """Adds the effect of a round in its best form, if the gain that the round saw lasts: fitted to the end, with
+        outliers of its own, the readings must be decisively likelier than before."""
         best, engine, before = round_.accepted, self.engine, self.fit
+        assumed = engine.robust, engine.measurements
         engine.robust = True
         one = Accepted(best, round_, best.refit, best.surely_explained)
         self.history.append(round_)
@@ -222,7 +223,16 @@ class Selection:
         if needs_history and engine.revise_initial_history(self.fit, fixed):
             self.fit = self.calibrate(self.fits, values_of(self.fit))
         self.refine_form(one)
+        gain = self.fit.log_evidence - before.log_evidence
+        if gain < settings.DECISIVE:
+            self.history.pop()
+            self.accepted.pop()
+            self.fit = before
+            engine.robust, engine.measurements = assumed
+            round_.refute(gain)
+            return False
         one.residual = self.fit.residual[:, :3]
+        return True
 
     def refine_form(self, one: Accepted) -> None:
         """Frees the shape of an accepted effect, and tries its other constitutive laws, where that helps.
