@@ -12,7 +12,7 @@ inline constexpr EffectInfo info{
         "vanishes at rest.",
     .measure = "Move along the same path at two speeds, or stop before each reading.",
     .look_alikes = "backlash_rotation friction",
-    .reference = "kalibr (time offset estimation); any streamed data",
+    .reference = "Furgale, Rehder & Siegwart 2013",
     .needs = {.order = true, .time = true},
     .starts = {{{"spread", 0.5}}},
 };

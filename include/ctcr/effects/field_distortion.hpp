@@ -18,7 +18,7 @@ inline constexpr EffectInfo info{
         "Read known points of a plate; move the robot base within the field; look for metal where metal_x, metal_y and "
         "metal_z say.",
     .look_alikes = "sensor_offset precurvature_profile",
-    .reference = "Hummel et al. 2005; Harish et al.",
+    .reference = "Hummel et al. 2005; Jackson, Classical Electrodynamics",
     .variants = {{"scale", "scale"}, {"scale", "z_yz"}, {"metal_volume", "coils_z"}, {"scale", "turn_z_yz"}},
 };
 
