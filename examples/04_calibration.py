@@ -18,7 +18,7 @@ held_out = readings.run % 4 == 3
 fit = joint.fit(robot, readings, "standard", rows=~held_out)
 
 print(f"nominal    {fit.nominal_rms_mm(held_out):6.3f} mm RMS on the runs held out")
-print(f"calibrated {fit.rms_mm(held_out):6.3f} mm, noise floor {fit.expected_mm(held_out):.3f} mm")
+print(f"calibrated {fit.rms_mm(held_out):6.3f} mm, expected error {fit.expected_mm(held_out):.3f} mm")
 print(f"reduced chi-square {fit.reduced_chi_square:.2f}")
 
 # Values in the units of the robot file. Posterior over prior near 1: the data say nothing.
