@@ -89,7 +89,7 @@ def rotated(quaternion: ArrayLike, vector: ArrayLike) -> Array:
 
 
 def inverse_pose(position: Array, quaternion: Array) -> tuple[Array, Array]:
-    """The frame in which poses (M, 3), (M, 4) are given, seen from each of them."""
+    """Inverses of poses (M, 3), (M, 4): the frame in which they are given, as seen from each of them."""
     back = conjugate(quaternion)
     return -np.einsum("mij,mj->mi", matrix_from_quaternion(back), position), back
 

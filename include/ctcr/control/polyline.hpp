@@ -30,8 +30,10 @@ public:
 
   /// ok; invalid_settings: there is no corner, or one is not finite. Real time: yes.
   [[nodiscard]] Status check() const noexcept { return is_way_ ? Status::ok : Status::invalid_settings; }
+  /// Time from start to end [s]. Real time: yes.
   [[nodiscard]] double duration() const noexcept { return duration_; }
 
+  /// Pose and velocity of the tip at the time t [s], base frame; before the start and after the end it rests there.
   /// Real time: yes.
   [[nodiscard]] Reference at(double t) const noexcept {
     Reference r{{orientation_, start_}};

@@ -33,9 +33,12 @@ public:
 
   /// ok; invalid_settings: there are fewer than 4 points, one is not finite, or two in a row are the same. Real time: yes.
   [[nodiscard]] Status check() const noexcept { return length() > 0 ? Status::ok : Status::invalid_settings; }
+  /// Of the curve [m]. Real time: yes.
   [[nodiscard]] double length() const noexcept { return arc_length_.back(); }
+  /// Time from start to end [s]. Real time: yes.
   [[nodiscard]] double duration() const noexcept { return motion_.duration(); }
 
+  /// Pose and velocity of the tip at the time t [s], base frame; before the start and after the end it rests there.
   /// Real time: yes.
   [[nodiscard]] Reference at(double t) const noexcept {
     Reference r{{orientation_, start_}};

@@ -10,7 +10,7 @@ namespace ctcr {
 class Trapezoid {
 public:
   struct Point {
-    double position, velocity;
+    double position, velocity;  ///< [m], [m/s]
   };
 
   Trapezoid() noexcept = default;
@@ -27,7 +27,7 @@ public:
   /// Time from start to end [s].
   [[nodiscard]] double duration() const noexcept { return duration_; }
 
-  /// Before the start and after the end it rests there.
+  /// Where it is at the time t [s]; before the start and after the end it rests there.
   [[nodiscard]] Point at(double t) const noexcept {
     if (t <= 0) return {0, 0};
     if (t >= duration_) return {length_, 0};

@@ -36,7 +36,8 @@ struct Left {
   double f, by_z, by_softening, by_plateau, by_sharpness;
 };
 
-/// f = r + (1 - r) (1 + t)^(-1/p), t = (2 c z / (1 - r))^(p/2), with the softening c, the plateau r, the sharpness p.
+/// f = r + (1 - r) (1 + t)^(-1/p), t = (2 c z / (1 - r))^(p/2), with z [1/m^2], the softening c [m^2], the plateau r and the
+/// sharpness p.
 /// @param by_shape  whether the derivative by the sharpness is wanted, too
 inline Left stiffness_left(double z, double c, double r, double p, bool by_shape) noexcept {
   if (!(c * z > 1e-12)) return {1 - c * z, -c, -z, 0, 0};  // there the same, with the derivatives of p = 2

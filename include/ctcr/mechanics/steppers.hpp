@@ -12,7 +12,7 @@ struct NoStageRecord {
 };
 
 /// Moves the frame by the fourth-order Magnus exponential of the curvatures at the start, the middle and the end of a step.
-/// @param k  step [m], negative towards the base
+/// @param u0, u_mid, u1  about the x and y axes of the Bishop frame [1/m]   @param k  step [m], negative towards the base
 template <class F, class S, class H>
 CTCR_INLINE void move_frame(F& frame, const std::array<S, 2>& u0, const std::array<S, 2>& u_mid, const std::array<S, 2>& u1,
                        const H& k) noexcept {

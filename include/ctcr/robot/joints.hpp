@@ -19,7 +19,7 @@ inline constexpr double largest_angle = 1e6;
 
 /// Checks order and range: beta_1 <= ... <= beta_N <= 0 and l_1 + beta_1 >= ... >= l_N + beta_N >= 0 (equality is a
 /// flush tip); |alpha_i| <= largest_angle. `slack` [m] forgives rounding of recorded joints.
-/// @return ok, joints_out_of_order, tip_behind_plate or not_finite, an angle too large included. Real time: yes.
+/// @return ok; joints_out_of_order; tip_behind_plate; not_finite: also for an angle too large. Real time: yes.
 template <int N>
 [[nodiscard]] Status check_joints(const Robot<N>& robot, const Joints<N>& q, double slack = 1e-6) noexcept {
   if (!all_finite(q.beta, q.alpha) || q.alpha.cwiseAbs().maxCoeff() > largest_angle) return Status::not_finite;

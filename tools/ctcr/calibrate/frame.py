@@ -114,7 +114,7 @@ def world_rotation(tips: Array, seen: Array) -> Array:
 
 
 def rms_mm(robot: Robot, readings: Measurements) -> float:
-    """RMS error of the positions."""
+    """RMS distance of the readings from the positions that the standard model predicts, where it has a solution."""
     return 1e3 * float(np.sqrt(np.nanmean(tips.errors(robot, readings) ** 2)))
 
 

@@ -59,7 +59,8 @@ class Form:
         return design @ np.linalg.lstsq(gram + damping, design.T @ self.local(error), rcond=None)[0]
 
     def size(self, error: Array) -> tuple[float, str]:
-        """RMS [mm] of the fit, and the axis that holds most of its square, "" if none does."""
+        """RMS [mm] of the fit to an error (K, 3) [m], base frame, and the axis that holds most of its square; "" if
+        none does."""
         square = np.sum(self.fitted(error) ** 2, axis=0)
         main = int(np.argmax(square))
         named = not self.coupled and square[main] > settings.MAIN_AXIS * square.sum()

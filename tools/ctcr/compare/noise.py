@@ -1,4 +1,4 @@
-"""Scatter of one reading (the noise floor), and hysteresis: errors that depend on the direction of approach."""
+"""Scatter of one reading, by which readings repeat, and hysteresis: errors that depend on the direction of approach."""
 
 from dataclasses import dataclass
 
@@ -177,9 +177,10 @@ def p_larger(sample: Array, reference: Array) -> float:
 
 
 def beyond(square: Array, axis: float, blocks: Integers) -> float:
-    """p-value that no more than a quarter of (P,) squared 3-D distances lie beyond the upper quartile of noise.
+    """p-value that no more than a quarter of P distances lie beyond the upper quartile of noise.
 
-    axis: the noise of one reading per axis. The fraction beyond is judged by its scatter from block to block.
+    square: the squared 3-D distances (P,) [m^2]; axis: standard deviation of the noise along one axis [m]; blocks (P,):
+    the block of each. The fraction beyond is judged by its scatter from block to block.
     """
     beyond = (square > chdtri(3, 0.25) * axis**2).astype(float)
     error = max(np.nan_to_num(block_error(beyond, blocks)), np.sqrt(0.25 * 0.75 / len(beyond)))

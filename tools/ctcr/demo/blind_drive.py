@@ -9,7 +9,7 @@ from ctcr.model.model import Model
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
-TURN = np.deg2rad(60.0)  # in one direction: longer than the memory of friction
+TURN = np.deg2rad(60.0)  # in one direction: far enough to forget how friction stood
 CLOSE = 2e-5  # [m] from a point, by the model
 MOST_STEPS = 40
 DAMPING = 1e-3  # of the least-squares step, relative
@@ -17,7 +17,8 @@ RADIAN = 0.05  # [m]: weight of a turn by 1 rad in it
 
 
 def drive(robot: Robot, start: ArrayLike, points: ArrayLike) -> Measurements:
-    """A plan without poses: a turn that wipes out the memory of friction, the start (2N,), then a row a point.
+    """A plan without poses: a turn after which friction no longer depends on what was before, the start (2N,) [m],
+    [rad], then a row a point.
 
     points (P, 3) [m], tracker frame. Raises InputError where the model cannot reach one.
     """

@@ -44,7 +44,7 @@ def read_hdf5(path: Path, content: bytes) -> Log:
 
 
 def read_numpy(path: Path, content: bytes) -> Log:
-    """A .npz or .npy file. The columns of a single matrix have no names."""
+    """A .npz or .npy file. The columns of a single matrix have no names. Raises InputError where it is damaged."""
     try:
         loaded = np.load(io.BytesIO(content))
         arrays = {path.stem: loaded} if isinstance(loaded, np.ndarray) else {name: loaded[name] for name in loaded}

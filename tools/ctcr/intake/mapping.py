@@ -35,7 +35,7 @@ class Used:
     column: int
     name: str
     unit: Unit | None  # None: not known from its name
-    how: str
+    how: str  # that unit is known: by the name, or by the format of the log
 
 
 @dataclass

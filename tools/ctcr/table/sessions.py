@@ -47,14 +47,14 @@ class Sessions:
         )
 
     def taken_out(self, readings: Readings) -> Readings:
-        """Readings as they were taken, without what each run has of its own."""
+        """Readings, given as they were taken, as seen from one frame and with one set of homes."""
         index = np.searchsorted(self.run, readings.run)
         turn = Rotation.from_rotvec(self.turn[index]).inv()
         position = self.origin + turn.apply(readings.positions - self.shift[index] - self.origin)
         return replace(self._turned(readings, position, turn, 1.0), sessions=self)
 
     def put_back(self, readings: Readings) -> Readings:
-        """Such readings as they were taken."""
+        """The inverse of `taken_out`."""
         index = np.searchsorted(self.run, readings.run)
         turn = Rotation.from_rotvec(self.turn[index])
         position = self.origin + turn.apply(readings.positions - self.origin) + self.shift[index]

@@ -149,7 +149,7 @@ def load(path: str | Path, n_tubes: int) -> Scenario:
 
 
 def parse(text: str, file: str, n_tubes: int) -> Scenario:
-    """The scenario described by a text; `file` is its name in errors."""
+    """The scenario described by a text; `file` is its name in errors. Raises InputError with all its faults."""
     return _scenario(yaml_document.parse(text, file), n_tubes)
 
 

@@ -53,7 +53,8 @@ struct KnownCircle {
 };
 
 /// The circle with both offsets equal, from linear least absolute deviations: an ellipse c + A cos + B sin is linear in
-/// its unknowns, so there is one minimum, and outliers hardly matter. The reference is kept.
+/// its unknowns, so there is one minimum, and outliers hardly matter.
+/// @param reference  as Circle::reference, which it becomes   Real time: no.
 inline Circle approximate_circle(const std::vector<CircleReading>& readings, const KnownCircle& known,
                                  const Vec3& reference) {
   const Eigen::Index n = Eigen::Index(readings.size()), shift = known.centre ? 0 : 1;

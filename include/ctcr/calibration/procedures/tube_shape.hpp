@@ -87,7 +87,7 @@ inline double arc_position(const Vec2& point, const LineAndArc& bend) {
   return (angle < 0 ? angle + 2 * std::numbers::pi : angle) / k;
 }
 
-/// By junction, heading and curvature.
+/// Distance of a point over `scale`, by junction, heading and curvature.
 struct LineAndArcResidual {
   static constexpr int size = 1, parameters = 4;
   Vec2 point;
@@ -102,7 +102,7 @@ inline double distance(const Vec2& point, const LineAndArc& bend) {
   return distance<double>(point, bend.junction.data(), bend.heading, bend.curvature);
 }
 
-/// Cost of the robust fit, median distance and derivative (points, 4) by junction, heading and curvature.
+/// A bend after the robust fit, and the derivative (points, 4) of the distances by junction, heading and curvature.
 struct Refined {
   LineAndArc bend;
   Eigen::MatrixXd J;

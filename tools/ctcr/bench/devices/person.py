@@ -48,7 +48,7 @@ class Person:
         return 1e-3 * click.prompt(text, type=Finite(), err=True)
 
     def fasten(self, tube: int | None) -> None:
-        """Puts the sensor on the tip of a tube, or takes it off."""
+        """Puts the sensor on the tip of a tube (0: innermost), or takes it off (None)."""
         if tube is None:
             _ask("Take the sensor off the tube")
         else:

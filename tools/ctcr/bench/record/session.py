@@ -78,7 +78,8 @@ class Options:
 
 @dataclass
 class Progress:
-    """For displays; errors against the model, NaN where it has no solution."""
+    """How far a recording has come, for displays. `errors_mm` are those of the model at the readings, NaN where it has
+    no solution."""
 
     total: int
     done: int = 0

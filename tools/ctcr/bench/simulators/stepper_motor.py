@@ -73,7 +73,7 @@ class StepperMotor:
         return self.enabled and self.jammed and self.speed != 0
 
     def advance(self, now: float, overload: bool) -> None:
-        """Moves on to the time `now` [s]."""
+        """Moves on to the time `now` [s], by 0.05 s at most; while `overload` lasts, the motor heats up."""
         step = 0.0 if self._time is None else min(0.05, now - self._time)
         self._time = now
         if not self.enabled:
