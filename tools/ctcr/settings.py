@@ -16,7 +16,7 @@ MOVED_FAR = 2.0  # prior standard deviations beyond which a fitted value contrad
 
 # ---- Model: numerical errors that stay far below the tracker's noise
 
-STEPS = 2  # integration steps per segment, at least
+STEPS = 2  # factor on the integration steps of every segment, at least
 MOST_STEPS = 16  # ... and at most: no known robot needs more
 INTEGRATION_ERROR = 0.25  # chi-square of integration errors over all rows: shifts no parameter by more than half its sd
 INTEGRATION_ERROR_COARSE = 1.0  # the same where log evidences are only compared: their error is a half of it
@@ -24,7 +24,7 @@ INTEGRATION_SAMPLE = 300  # rows on which integration errors are estimated
 DIFFERENCE_STEP = 1e-4  # [prior sd] of central differences of a user's functions
 POSITION_STEP, ROTATION_STEP = 1e-6, 1e-5  # [m], [rad] of central differences by the sensor's pose
 PROFILE_STEP = 1e-3  # [prior sd] of differences of whole predictions, which carry solver tolerance
-PROFILE_STEPS = 16  # integration steps per segment, at least, of tubes with profiles: these change within a segment
+PROFILE_STEPS = 16  # the same factor, at least, for tubes with profiles: these change within a segment
 
 # ---- Audit of a table, before any physics
 

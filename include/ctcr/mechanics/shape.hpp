@@ -34,7 +34,7 @@ struct ShapePoint {
   }
 };
 
-/// Integration steps per segment with which shapes are computed: converged to about 1e-8 m.
+/// Factor on the integration steps with which shapes are computed: converged to about 1e-8 m.
 inline constexpr int shape_steps = 16;
 
 namespace detail {

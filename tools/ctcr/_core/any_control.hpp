@@ -13,7 +13,7 @@ namespace ctcr::python {
 struct SystemValues {
   Eigen::VectorXd parameters;  ///< as Table::parameters
   Eigen::VectorXd effects;     ///< as Table::effects; empty: the standard model
-  int steps = 1;               ///< integration steps per segment
+  int steps = 1;               ///< as Settings::steps
 };
 
 /// Weights and settings of the tasks, in the order of the task list.

@@ -20,7 +20,7 @@ enum class Integrator : std::uint8_t { standard, ssp_rk3, classical_rk4, prince_
 
 struct PredictOptions {
   Integrator integrator = Integrator::standard;  ///< derivatives and effects need the standard one
-  int steps = 1;                                 ///< integration steps per segment
+  int steps = 1;                                 ///< as Settings::steps
   int tip_of = 0;                                ///< tube whose tip is asked for, from 0
   int threads = 0;                               ///< 0: all cores
   bool derivatives = false;                      ///< by joints and load

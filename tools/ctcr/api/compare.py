@@ -20,7 +20,7 @@ from ctcr.table.measurements import Measurements, check_of
 def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
     """Compares predicted poses with measured ones: the size of the error beside the noise, and what it depends on.
 
-    steps    integration steps per segment: more are slower and more accurate
+    steps    factor on the integration steps: more are slower and more accurate
     First tests whether the table or the robot file follows another convention; where they cannot be compared as they
     are, corrected ones are. Raises InputError where no row can be compared.
     """

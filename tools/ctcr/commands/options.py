@@ -100,7 +100,9 @@ measurements = click.argument("measurements", type=read)
 folder_name = click.option(
     "--folder", metavar="FOLDER", help="Where the processes of one bench meet (mode 0700); default: one of this user's."
 )
-steps = setting("--steps", click.IntRange(1, 1000), 4, "Integration steps per segment; more are slower, more accurate.")
+steps = setting(
+    "--steps", click.IntRange(1, 1000), 4, "Factor on the integration steps; more are slower, more accurate."
+)
 threads = setting("--threads", click.IntRange(0), 0, "Threads; 0: one per core.")
 seed = setting("--seed", click.IntRange(min=0), 1, "Seed of the random numbers: the same seed gives the same result.")
 noise = setting(

@@ -34,7 +34,8 @@ INTEGRATORS = {
 
 @dataclass(frozen=True, repr=False)
 class Prediction(Shown):
-    """What the model says of M configurations, base frame. NaN where there is no solution: `why` says why."""
+    """What the model says of M configurations, base frame if not asked for in another. NaN where there is no solution:
+    `why` says why."""
 
     position: Array  # (M, 3) [m], tip of the tube that carries the sensor
     quaternion: Array  # (M, 4), w first and not negative
@@ -73,7 +74,7 @@ class Prediction(Shown):
 
 @dataclass(frozen=True)
 class Shape:
-    """The robot from the front plate to its tip at K places: uniform ones and every breakpoint.
+    """The robot from the front plate to its tip at K arc lengths: uniform ones and every breakpoint.
 
     Frames do not twist along the robot: at the plate they are the base frame, and tube i stands at `tube_angle[i]`
     about their z axis, the tangent. Where curvatures jump the values are those of the base side.
@@ -90,11 +91,11 @@ class Shape:
     tube_moment: Array  # (N, K, 3) [N m], in the tube's own frame
 
     def position_at(self, arc_length: ArrayLike) -> Array:
-        """Positions (..., 3) [m] in the base frame at arc lengths (...) [m], linear between the K places."""
+        """Positions (..., 3) [m] in the base frame at arc lengths (...) [m], linear between the K."""
         return np.stack([np.interp(arc_length, self.arc_length, axis) for axis in self.position.T], axis=-1)
 
     def tube_quaternion(self, tube: int) -> Array:
-        """Material frame of a tube (0: innermost) at each place (K, 4); NaN where it is not there."""
+        """Material frame of a tube (0: innermost) at each arc length (K, 4); NaN where it is not there."""
         half = self.tube_angle[tube] / 2
         about_z = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
         return product(self.quaternion, about_z)
@@ -109,9 +110,10 @@ SOLVED = status_text(0)
 
 
 class Model:
-    """Model of a robot. `steps` integration steps per segment: more is finer and slower.
+    """Model of a robot. `steps` is a factor on the integration steps of every segment: more is finer and slower.
 
-    `integrator` is one of INTEGRATORS; those beside the default serve to compare and give poses alone.
+    `integrator` is one of INTEGRATORS; those beside the default serve to compare, give poses alone and take `steps` in
+    every segment.
     Joints are `beta` [m], <= 0, where each tube is grasped, and `alpha` [rad], the angle of its base; innermost tube
     first. Loads act at the robot tip: `force` [N] and `moment` [N m], base frame. Arrays of other types than float64
     are converted. A robot's effects (see `effects.catalogue`) act on poses, derivatives and shapes, but for those
@@ -202,7 +204,7 @@ class Model:
         *,
         points: int = 200,
     ) -> Shape:
-        """The shape at one configuration: `beta` and `alpha` (N,), loads (3,) or None; `points` uniform places.
+        """The shape at one configuration: `beta` and `alpha` (N,), loads (3,) or None; `points` uniform arc lengths.
 
         Integrated finely with the default integrator, whatever `steps`. Raises ValueError where there is no solution.
         """

@@ -35,7 +35,8 @@ def session_part(measurements: Measurements) -> Array:
 def steps_for(
     robot: Robot, measurements: Measurements, noise: _core.Noise, chi_square: float = settings.INTEGRATION_ERROR
 ) -> int:
-    """The fewest integration steps per segment whose errors, of all rows against the tracker's jitter, stay below that.
+    """The smallest factor on the integration steps whose errors, of all rows against the tracker's jitter, stay below
+    `chi_square`.
 
     Integration errors are systematic: what one reading hides, many show. They fall with the fourth power of the steps.
     """

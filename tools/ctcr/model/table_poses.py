@@ -1,4 +1,4 @@
-"""The poses that a model predicts for the rows of a table, in their order, which effects may remember."""
+"""The poses that a model predicts for the rows of a table, in their order, on which effects with history depend."""
 
 from collections.abc import Iterator
 
@@ -19,7 +19,7 @@ PER_ROW = ("position", "quaternion", "status", "stability")
 def predict(robot: Robot, table: Measurements, *, steps: int = 4, frame: str = "base") -> Prediction:
     """The poses of all rows, with the effects of the robot.
 
-    steps    integration steps per segment: more are slower and more accurate
+    steps    factor on the integration steps: more are slower and more accurate
     frame    "base", or "tracker": as measured
     """
     if frame not in ("base", "tracker"):
