@@ -20,8 +20,8 @@ def command(robot: str | None, out) -> None:
     """Time the model on random joints.
 
     ROBOT is by default the robot of the paper's Table II. The times hold for this machine at this moment: absolute
-    times mean nothing across machines. The benchmark of the library itself, with instruction counts and the rival,
-    is `tools/dev bench`.
+    times mean nothing across machines. The benchmark of the library itself, beside the paper's method, is
+    `tools/dev bench`.
 
     A robot that is slow to solve gets fewer configurations.
 

@@ -253,7 +253,7 @@ def curvature(table: str, **others) -> None:
     "--hold-out",
     type=click.IntRange(min=0),
     metavar="N",
-    help="Runs held out of a second fit to judge it, evenly spread; 0: none; default: a quarter.",
+    help="Runs held out of a second fit to judge it, evenly spread; 0: none; default: each quarter in turn.",
 )
 @options.setting(
     "--noise",

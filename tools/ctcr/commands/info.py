@@ -11,7 +11,7 @@ from ctcr.commands import options
 def command(robot: str, out) -> None:
     """Show the values of a robot file.
 
-    With the stiffnesses that follow from them, and values that look wrong.
+    Also shows the stiffnesses that follow from them, and says which values look wrong.
 
     Example: ctcr info robot.yaml
     """

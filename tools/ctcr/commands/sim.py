@@ -94,7 +94,9 @@ def bench(robot, program, folder, tracker_scenario, bus_scenario, seed, **physic
 @command.command(name="set")
 @click.argument("device", type=click.Choice(["aurora", "ethercat"]))
 @click.argument("settings", nargs=-1, metavar="[FAULT=VALUE]...")
-@click.option("--force", nargs=3, type=float, metavar="FX FY FZ", help="Hang a weight: force at the tip [N].")
+@click.option(
+    "--force", nargs=3, type=float, metavar="FX FY FZ", help="Hang a weight: force at the tip [N], base frame."
+)
 @click.option("--break", "line_break", is_flag=True, help="A break on the serial line: resets the tracker.")
 @options.folder
 def set_(device, settings, force, line_break, folder) -> None:
