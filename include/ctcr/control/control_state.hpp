@@ -30,7 +30,7 @@ struct Gaps {
   VecN<N> bases, tips;
 };
 
-/// Real time: yes.
+/// The gaps at beta [m]. Real time: yes.
 template <int N>
 [[nodiscard]] Gaps<N> gaps(const Robot<N>& robot, const VecN<N>& beta) noexcept {
   Gaps<N> g;

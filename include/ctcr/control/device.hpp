@@ -7,7 +7,7 @@
 
 namespace ctcr {
 
-/// What a robot tells once a period.
+/// What encoders and tracker of a robot read in a period.
 template <int N>
 struct Measurement {
   MotorAngles<N> theta;  ///< [rad]

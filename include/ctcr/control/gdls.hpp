@@ -39,7 +39,7 @@ public:
     b_.noalias() += JtW * v;
   }
 
-  /// Adds a goal of the joints.
+  /// Adds a goal of the joints: velocities v [m/s], [rad/s].
   void add_joint_goal(const JointVelocity<N>& v, Weight w) noexcept {
     least_weight_ = std::min({least_weight_, w.translation, w.rotation});
     JointVelocity<N> diagonal;

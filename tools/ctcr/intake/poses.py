@@ -90,7 +90,7 @@ def inverse(pose: Pose) -> Pose:
 
 
 def seen_from(reference: Pose, pose: Pose) -> Pose:
-    """A pose in the frame of another marker."""
+    """A pose in the frame of the marker `reference`, both given in the tracker frame."""
     away = pose.position - reference.position
     back = frames.conjugate(reference.quaternion)
     rotation = frames.matrix_from_quaternion(back)

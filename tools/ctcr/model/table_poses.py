@@ -21,6 +21,7 @@ def predict(robot: Robot, table: Measurements, *, steps: int = 4, frame: str = "
 
     steps    factor on the integration steps: more are slower and more accurate
     frame    "base", or "tracker": as measured
+    Raises InputError where the table is not one of this robot, or only another convention makes it possible.
     """
     if frame not in ("base", "tracker"):
         raise ValueError(f"frame must be base or tracker, not {frame!r}")

@@ -103,7 +103,7 @@ class AxisControl:
             self.halt(STOP_RAMPS)
 
     def set_joints(self, joints: ArrayLike) -> None:
-        """Homing: the joints are at these values now."""
+        """Homing: the joints (2N,) are at these values [m], [rad] now, and at rest."""
         self.setpoint = self.joints = np.array(joints, float)
         self._motion, self.homed = None, True
         self._speeds = 0 * self.setpoint
