@@ -24,8 +24,9 @@ def command(robot: str, table: str, target: str, frame: str, steps: int, out) ->
     """Add predicted poses to a table.
 
     Each row of TABLE, with joints and forces, gets the pose that the model of ROBOT predicts. The new columns are
-    pred_x_m, pred_y_m, pred_z_m and the unit quaternion pred_qw, pred_qx, pred_qy, pred_qz of the tube that carries
-    the sensor, with the effects that ROBOT has. Rows without a solution stay empty and are listed.
+    pred_x_m, pred_y_m, pred_z_m and the unit quaternion pred_qw, pred_qx, pred_qy, pred_qz: of the sensor in the
+    tracker frame, of the tip that carries it in the base frame, with the effects that ROBOT has. Rows without a
+    solution stay empty and are listed.
 
     Example: ctcr predict robot.yaml measurements.csv -o predicted.csv
     """
