@@ -20,7 +20,6 @@ from ctcr.robot.description import Robot
 from ctcr.robot.yaml_document import FieldPath
 from ctcr.show.wording import listed
 
-SIGMAS_AT_95 = 2.80  # the norm of a 3-D Gaussian is below 2.80 standard deviations of an axis in 95 % of cases
 AXES = "xyz"
 LONGEST_MM = 10e3  # of a tube, as the core demands of lengths that are measured by hand
 
@@ -60,8 +59,9 @@ def tracker_noise(robot: Robot | None, table: Table | None = None) -> dict[str, 
     """
     noise = {}
     if robot is not None:
-        noise["jitter"] = 1e-3 * (robot.tracker.jitter_mm or 0.0)
-        noise["field_error"] = 1e-3 * (robot.tracker.accuracy_95_mm or 0.0) / SIGMAS_AT_95
+        jitter_mm, accuracy_95_mm = robot.tracker.jitter_mm or 0.0, robot.tracker.accuracy_95_mm or 0.0
+        noise["jitter"] = 1e-3 * jitter_mm
+        noise["field_error"] = 1e-3 * _core.field_of_accuracy(accuracy_95_mm, jitter_mm)
     if table and "scatter" in table and "readings" in table:
         known = (table["readings"] > 0) & np.isfinite(table["scatter"])
         if known.any():
