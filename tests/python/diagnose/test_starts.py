@@ -1,5 +1,6 @@
 """Where a candidate begins: a moment, a local source of field. Found by search, as no derivative leads there."""
 
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -125,6 +126,25 @@ def test_source_search(engine, seed):
     assert np.linalg.norm(found[:3] - place) < 0.015
     column, whole = (columns[:, :, 0] / jitter).ravel(), (signal / jitter).ravel()
     assert (column @ whole) ** 2 > 0.98 * (column @ column) * (whole @ whole)
+
+
+def test_held_out_unseen(engine):
+    """Where a search begins does not depend on readings that are held out."""
+    other, random = copy(engine), np.random.default_rng(2)
+    other.positions = np.where(engine.rows[:, None], engine.positions, random.normal(0, 1, engine.positions.shape))
+    columns, by_force = random.normal(size=(2, len(engine.rows), 6, 3))
+    contact = next(c for c in candidates(engine.robot, engine.measurements)[0] if c.id == "contact")
+    source = Candidate("field_distortion", SOURCE)
+
+    def found(engine, candidate):
+        def worth(columns):
+            return float(np.sum(columns[engine.fitted]))
+
+        return [[one.shape for one, _ in some] for some in starts.options(engine, candidate, columns, by_force, worth)]
+
+    for candidate in (contact, source):
+        assert found(engine, candidate) == found(other, candidate)
+        assert any(map(len, found(engine, candidate)))
 
 
 def test_source_forms(engine):

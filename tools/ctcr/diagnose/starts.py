@@ -88,9 +88,9 @@ def _surfaces(engine: Engine, candidate: Candidate, surface: list[str], by_force
     for elevation in np.deg2rad(settings.SURFACE_ELEVATIONS):
         for azimuth in around if elevation < 1.5 else [0.0]:
             height, normal = heights(engine, azimuth, elevation), _normal(azimuth, elevation)
-            distance = np.quantile(height, part)
+            distance = np.quantile(height[engine.fitted], part)
             depth = np.maximum(height - distance, 0.0)
-            if np.count_nonzero(depth) < settings.FEWEST_CONTACTS:
+            if np.count_nonzero(depth[engine.fitted]) < settings.FEWEST_CONTACTS:
                 continue
             column = -sd * depth[:, None] * (by_force @ normal)
             shape = usual | dict(zip(surface, map(float, (distance, azimuth, elevation)), strict=True))
@@ -112,8 +112,9 @@ def _normal(azimuth: float, elevation: float) -> Array:
 def _source(engine: Engine, candidate: Candidate, worth: Worth) -> Option:
     """The candidate with the best position of a local source of field: a grid around the readings, then a simplex."""
     _, sd, _, _ = engine.priors(candidate.names)
-    centre = np.median(engine.positions, axis=0)
-    radius = np.quantile(np.linalg.norm(engine.positions - centre, axis=1), settings.SOURCE_FAR)
+    readings = engine.positions[engine.fitted]
+    centre = np.median(readings, axis=0)
+    radius = np.quantile(np.linalg.norm(readings - centre, axis=1), settings.SOURCE_FAR)
 
     def derivative(at: Array) -> Array:  # by the volume, with metal and coils at[:3] and at[3:]
         column = -sd[0] * _core.metal_distortion(engine.positions - at[3:], at[:3] - at[3:])
