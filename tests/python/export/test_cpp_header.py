@@ -11,10 +11,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from ctcr.bench.devices import bench_file
+from ctcr.cli import cli
 from ctcr.effects import catalogue
 from ctcr.errors import InputError
 from ctcr.export import cpp_header
+from ctcr.export.cpp_header import is_free
 from ctcr.inputs import sha256
 from ctcr.model import fields, parameters, recording
 from ctcr.model.model import Model
@@ -221,6 +224,27 @@ def test_bench_limits():
     np.testing.assert_allclose([float(value) for value in low], expected)
 
 
+def test_without_tracker(tmp_path):
+    """A robot file without a tracker makes T_ref the identity, which the command says; with one it does not."""
+    bare = tmp_path / "bare.yaml"
+    bare.write_text(re.sub(r"^tracker:\n(?:  .*\n)+", "", TABLE2.read_text(), flags=re.M))
+    for source, is_said in ((bare, True), (TABLE2, False)):
+        done = CliRunner().invoke(cli, ["export", str(source), "--cpp", str(tmp_path / "robot.hpp")])
+        assert done.exit_code == 0, done.output
+        assert ("no tracker: T_ref in the header is the identity" in done.output) == is_said
+
+
+@pytest.mark.skipif(not shutil.which("c++"), reason="no compiler is installed")
+def test_macros(tmp_path):
+    """Of the macros of standard headers, none that begins with a capital is accepted as a name."""
+    source = tmp_path / "all.cpp"
+    source.write_text("".join(f"#include <{name}>\n" for name in ("cmath", "cstdio", "cerrno", "climits", "csignal")))
+    known = subprocess.run(["c++", "-std=gnu++20", "-dM", "-E", source], capture_output=True, text=True, check=True)
+    macros = {line.split()[1].partition("(")[0] for line in known.stdout.splitlines()}
+    assert {"M_PI", "EOF", "NULL", "SIG_DFL"} <= macros
+    assert not [name for name in macros if name[0].isupper() and is_free([name])]
+
+
 def test_refusals(monkeypatch):
     """What a controller cannot do without, effects written in Python, and names that are none."""
     robot = robot_file.load(TABLE2)
@@ -243,9 +267,29 @@ def test_refusals(monkeypatch):
         "and",
         "a::co_await",
         "NULL",
+        "M_PI",
+        "M_PIf",
+        "EOF",
+        "INFINITY",
+        "NAN",
+        "SYS_write",
+        "I",
+        "a::M_PI",
+        "errno",
+        "assert",
+        "linux",
+        "unix",
         "main",
+        "stdin",
+        "time",
+        "sin",
+        "size_t",
+        "tm",
+        "Eigen",
+        "a::std",
+        "a::ctcr::b",
     ):
         with pytest.raises(InputError, match="no free name"):
             cpp_header(robot_file.load(TABLE2), name)
-    for name in ("robot", "a::b_2", "classes", "Main"):
+    for name in ("robot", "a::b_2", "classes", "Main", "a::time", "mB", "robot_7"):
         assert f"namespace {name} {{" in cpp_header(robot_file.load(TABLE2), name)

@@ -36,6 +36,8 @@ def command(source, cpp, bench_path, namespace, target) -> None:
         robot = robot_file.load(source, compiled=True)
         write_text(cpp_header(robot, namespace, bench_file.load(bench_path) if bench_path else None), cpp)
         out.say(f"{namespace}::system(): {cpp}")
+        if "tracker" in robot.left_out:
+            out.say("The robot file has no tracker: T_ref in the header is the identity, base and tracker frame agree.")
         return
     from ctcr.track.recording import write_mcap
 

@@ -1,5 +1,6 @@
 """A robot as a C++ header for a controller: its numbers as constants, and a function that makes the model of them."""
 
+import ctypes
 import json
 import re
 from collections.abc import Iterable, Iterator
@@ -21,7 +22,8 @@ from ctcr.robot.ledger import section
 from ctcr.show.wording import deviation, number, visible
 
 RATIOS = ("translation_mm_per_rev", "rotation_rev_per_rev")
-# Of C++20: keywords, other spellings of operators, and what standard headers and GCC define.
+# Of C++20: keywords, other spellings of operators, and what standard headers and GCC define in lower case. Macros in
+# capitals and the names of the C library need no list, see is_free().
 TAKEN = set(
     """
     alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t char32_t class
@@ -31,7 +33,7 @@ TAKEN = set(
     reinterpret_cast requires return short signed sizeof static static_assert static_cast struct switch template this
     thread_local throw true try typedef typeid typename union unsigned using virtual void volatile wchar_t while xor
     xor_eq
-    EOF NAN NULL assert errno linux main offsetof unix
+    alloca assert errno i386 linux main offsetof timespec timeval tm unix
     """.split()
 )
 SAME = 1e-6  # relative: a ledger and a file round the same value to eight digits
@@ -103,13 +105,22 @@ def _check(robot: Robot, namespace: str) -> None:
         if getattr(robot.actuation, field) is None
     ]
     problems += catalogue.in_python(robot)
-    names = namespace.split("::")
-    possible = all(re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) and name not in TAKEN for name in names)
-    if not possible or names[0] in ("std", "ctcr"):
-        text = "is no free name in C++: use letters, digits and _"
+    if not is_free(namespace.split("::")):
+        text = "is no free name in C++, as those of macros and of the C library: use letters, digits and _"
         problems.append(Problem(text, field=f"namespace {visible(namespace)}"))
     if problems:
         raise InputError(problems)
+
+
+def is_free(names: list[str]) -> bool:
+    """Whether a header can declare these nested namespaces.
+
+    A name that begins with two capitals, or with one and a digit or _, is a macro by convention (M_PI, EOF). What the C
+    library defines, headers declare outside of all namespaces; POSIX keeps names that end in _t.
+    """
+    word = re.compile(r"(?![A-Z]([A-Z\d_]|$))[A-Za-z]\w*", re.ASCII)
+    free = all(word.fullmatch(name) and name not in TAKEN | {"std", "ctcr"} for name in names)
+    return free and names[0] != "Eigen" and not names[0].endswith("_t") and not hasattr(ctypes.CDLL(None), names[0])
 
 
 def _opening(robot: Robot) -> Iterator[str]:

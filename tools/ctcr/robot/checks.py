@@ -52,8 +52,7 @@ def validated(kind: type[S], document: YamlDocument) -> S:
 def doubts(robot: Robot) -> Iterator[Fault]:
     """Values that are possible but look wrong, and unknown ones that the model could use."""
     yield from ((path, quantity.doubt(value)) for path, quantity, value in robot.unusual())
-    if robot._source:
-        yield from (((name,), defaults.SAID[name]) for name in defaults.absent(robot._source.data))
+    yield from (((name,), defaults.SAID[name]) for name in robot.left_out)
     for i, tube in enumerate(robot.tubes):
         if (strain := tube.straightened_strain) > _MAX_STRAIN:
             text = f"straightening this tube strains it by {100 * strain:.1f} %: it yields"

@@ -23,6 +23,7 @@ from pydantic_core import PydanticCustomError
 
 from ctcr.arrays import Array
 from ctcr.frames import matrix_from_rotation_vector
+from ctcr.robot import defaults
 from ctcr.robot.units import Quantity
 from ctcr.robot.yaml_document import FieldPath, YamlDocument
 from ctcr.show.result import Glance, Shown
@@ -308,6 +309,11 @@ class Robot(Shown, Section):
     def file(self) -> str:
         """The file that the robot was loaded from; empty where it was not."""
         return self._source.file if self._source else ""
+
+    @property
+    def left_out(self) -> list[str]:
+        """The sections that its file leaves to the defaults."""
+        return defaults.absent(self._source.data) if self._source else []
 
     def glance(self) -> Glance:
         effects = f", effects: {', '.join(self.effects)}" if self.effects else ""
