@@ -97,6 +97,39 @@ TEST(Controller, StandsStillOnWhatItCannotUse) {
   EXPECT_EQ(v.translation.norm() + v.rotation.norm(), 0);
 }
 
+std::array<Mat3, 5> no_rotations() {
+  const Vec3 mirror(1, 1, -1);
+  return {Mat3::Constant(std::nan("")), Mat3::Zero(), mirror.asDiagonal(), 2 * Mat3::Identity(),
+          Eigen::Quaterniond(1, 0.5, 0, 0).toRotationMatrix()};
+}
+
+/// Whether orientation is tracked or not: what is not a rotation tells that the rest is wrong, too.
+TEST(Controller, RefusesRotationsThatAreNone) {
+  for (const double weight : {0.0, 1e5}) {
+    Loop loop;
+    Controller<3> controller(loop.system, {}, period);
+    controller.tip_force = TipForce::estimated;
+    controller.tasks.get<Tracking>().weight.rotation = weight;
+    SimulatedRobot<3> robot(loop.system, loop.start, {.force = {0, -0.1, 0}});
+    Measurement<3> good;
+    ASSERT_EQ(robot.measure(good), Status::ok);
+    for (const Mat3& none : no_rotations()) {
+      Measurement<3> bad = good;
+      bad.reading.rotation = none;
+      Reference nowhere;
+      nowhere.pose.rotation = none;
+      for (const auto& [measured, reference] : {std::pair{bad, Reference{}}, {good, nowhere}}) {
+        MotorAngles<3> v{Vec3::Ones(), Vec3::Ones()};
+        EXPECT_EQ(controller.advance(measured, reference, {}, v).status, Status::not_finite);
+        EXPECT_EQ(v.translation.norm() + v.rotation.norm(), 0);
+      }
+    }
+    EXPECT_EQ(controller.estimate.force.norm(), 0) << "what is refused leaves no trace";
+    MotorAngles<3> v;
+    EXPECT_EQ(controller.advance(good, {robot.tip()}, {}, v).status, Status::ok);
+  }
+}
+
 TEST(Controller, SettingsThatMeanNothingAreRefused) {
   Loop loop;
   const Measurement<3> measured{loop.start, {Mat3::Identity(), loop.at}};
@@ -119,8 +152,21 @@ TEST(Controller, SettingsThatMeanNothingAreRefused) {
   expect_refused({}, HUGE_VAL);
   expect_refused({.base_gap = 0.2}, period);  // allows no joints at all
   expect_refused({.beta_low = Vec3(-0.1, -1, -1), .beta_high = Vec3(-0.2, 0, 0)}, period);
-  loop.system.sensor.tube = 1;
-  expect_refused({}, period);
+  const PoseSensor good = loop.system.sensor;
+  for (const int tube : {-1, 1, 3}) {
+    loop.system.sensor.tube = tube;
+    expect_refused({}, period);
+  }
+  for (Pose PoseSensor::* const frame : {&PoseSensor::T_tracker_base, &PoseSensor::T_tip_sensor}) {
+    for (const Mat3& none : no_rotations()) {
+      loop.system.sensor = good;
+      (loop.system.sensor.*frame).rotation = none;
+      expect_refused({}, period);
+    }
+    loop.system.sensor = good;
+    (loop.system.sensor.*frame).position[2] = std::nan("");
+    expect_refused({}, period);
+  }
 }
 
 TEST(Controller, ARobotThatCannotExistIsRefusedAsSuch) {

@@ -30,5 +30,22 @@ TEST(Pose, IsIdentityByDefault) {
   EXPECT_TRUE(Pose{}.position.isZero(0));
 }
 
+/// A rotation written with four decimals is one; a mirror, a shear, a scaled one and any NaN are none.
+TEST(Rotation, IsTold) {
+  const Mat3& R = T_a_b.rotation;
+  EXPECT_TRUE(is_rotation(R));
+  EXPECT_TRUE(is_rotation((R * 1e4).array().round() / 1e4));
+  EXPECT_FALSE(is_rotation(-R));
+  EXPECT_FALSE(is_rotation(Mat3::Zero()));
+  EXPECT_FALSE(is_rotation(1.01 * R));
+  EXPECT_FALSE(is_rotation(Eigen::Quaterniond(1.01, 0.1, 0, 0).toRotationMatrix()));
+  for (int k = 0; k < 9; ++k)
+    for (const double bad : {R(k) + 0.01, std::nan(""), HUGE_VAL, 1e200}) {
+      Mat3 wrong = R;
+      wrong(k) = bad;
+      EXPECT_FALSE(is_rotation(wrong));
+    }
+}
+
 }  // namespace types_test
 }  // namespace ctcr

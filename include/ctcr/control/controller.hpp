@@ -54,7 +54,8 @@ public:
 
   /// @param system  the sensor sits on the innermost tube   @param period  of the calls [s], > 0
   /// A robot that cannot exist is answered by invalid_robot in all calls, and settings that mean nothing by
-  /// invalid_settings: check_limits(), limits that allow no joints at all, the period, a sensor on another tube.
+  /// invalid_settings: check_limits(), limits that allow no joints at all, the period, check_sensor(), a sensor on
+  /// another tube.
   Controller(const System<N, Fx>& system, const Limits<N>& limits, double period, const Tasks& wanted = {}) noexcept
     : tasks(wanted),
       system_(system),
@@ -76,15 +77,16 @@ public:
   }
 
   /// One period.
-  /// @param measured   motor angles and tracker reading (its rotation counts where orientation is tracked, or the sensor
-  ///                   sits beside the tip)
+  /// @param measured   motor angles and tracker reading. Its rotation counts where orientation is tracked, or the sensor
+  ///                   sits beside the tip; of a tracker that reads none give the identity.
   /// @param reference  wanted pose and velocity of the tip, base frame
   /// @param load       at the robot tip; only its moment counts unless the force is known
   /// @param velocity   of the motors [rad/s], finite; 0 unless the status is ok
   /// @return status ok; that of the model: singular: it is about to snap, and its Jacobian leads nowhere; singular: the
-  ///         goals leave a direction free; not_finite: a motor angle, reading, reference or goal is NaN or too large, or the
-  ///         reading is farther from the front plate than twice the length of the robot; invalid_settings: those given to
-  ///         the constructor, or a negative weight. What is refused stays out of the memory of effects, force and warm start.
+  ///         goals leave a direction free; not_finite: a motor angle, reading, reference or goal is NaN or too large,
+  ///         the rotation of the reading or the reference is none (is_rotation()), or the reading is farther from the front
+  ///         plate than twice the length of the robot; invalid_settings: those given to the constructor, or a
+  ///         negative weight. What is refused stays out of the memory of effects, force and warm start.
   ControlReport<Tasks> advance(const Measurement<N>& measured, const Reference& reference, const TipLoad& load,
                                MotorAngles<N>& velocity) noexcept {
     ControlReport<Tasks> report;
@@ -115,7 +117,8 @@ public:
     }
     const Vec3 moved = moved_since_reading();
     // The tip is no farther away than the robot is long; twice that forgives wrong frames.
-    if (!(tip.position.norm() <= 2 * system_.model.robot().tubes[0].length)) {
+    if (!(tip.position.norm() <= 2 * system_.model.robot().tubes[0].length) ||
+        !is_rotation(measured.reading.rotation) || !is_rotation(reference.pose.rotation)) {
       report.status = Status::not_finite;
       return report;
     }
@@ -161,7 +164,7 @@ private:
 
   [[nodiscard]] Status check_settings() const noexcept {
     if (system_.model.check() != Status::ok) return system_.model.check();
-    const bool possible = period_ > 0 && period_ < HUGE_VAL && system_.sensor.tube == 0 &&
+    const bool possible = period_ > 0 && period_ < HUGE_VAL && check_sensor(system_.sensor, 1) == Status::ok &&
                           check_limits(limits_) == Status::ok && allowed_.exist();
     return possible ? Status::ok : Status::invalid_settings;
   }

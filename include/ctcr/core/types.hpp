@@ -20,6 +20,14 @@ inline bool all_finite(const Matrices&... m) noexcept {
   return ((m * 0.0).sum() + ...) == 0;
 }
 
+/// Whether R is a rotation, but for the rounding of numbers with four decimals. A shear, a mirror, the matrix of a
+/// quaternion that is not of length 1, and NaN are none. Real time: yes.
+inline bool is_rotation(const Mat3& R) noexcept {
+  constexpr double rounding = 1e-3;  // entries of R R^T - I
+  return ((R * R.transpose() - Mat3::Identity()).array().abs() <= rounding).all() &&
+         R.col(0).cross(R.col(1)).dot(R.col(2)) > 0;
+}
+
 /// Rigid transform T_a_b: maps coordinates in frame b to frame a, x_a = rotation * x_b + position.
 struct Pose {
   Mat3 rotation = Mat3::Identity();

@@ -2,6 +2,7 @@
 #include <array>
 #include <cstddef>
 
+#include "ctcr/core/status.hpp"
 #include "ctcr/core/types.hpp"
 #include "ctcr/math/se3.hpp"
 
@@ -14,6 +15,16 @@ struct PoseSensor {
   int tube = 0;         ///< whose tip carries the sensor, 0 is the innermost
   Pose T_tip_sensor{};
 };
+
+/// Whether a robot of so many tubes can carry the sensor: it sits on one of them, positions are finite, and rotations are
+/// rotations (is_rotation()).
+/// @return ok or invalid_settings. Real time: yes.
+[[nodiscard]] inline Status check_sensor(const PoseSensor& sensor, int tubes) noexcept {
+  const auto is_pose = [](const Pose& T) { return is_rotation(T.rotation) && all_finite(T.position); };
+  const bool possible =
+      sensor.tube >= 0 && sensor.tube < tubes && is_pose(sensor.T_tracker_base) && is_pose(sensor.T_tip_sensor);
+  return possible ? Status::ok : Status::invalid_settings;
+}
 
 /// Where the sensor is, in the axes of the tip instead of its own; tracker frame. Real time: yes.
 [[nodiscard]] inline Pose seat(const PoseSensor& sensor, const Pose& T_base_tip) noexcept {
