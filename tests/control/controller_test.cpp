@@ -282,6 +282,41 @@ TEST(ForceEstimate, IsBoundedAndTakesNoOutliers) {
   }
 }
 
+/// Settings that mean nothing are refused while the force is estimated, and leave it as it was.
+TEST(ForceEstimate, SettingsThatMeanNothingAreRefused) {
+  const double nan = std::nan("");
+  const auto with = [](double ForceEstimate::* const setting, double value) {
+    ForceEstimate estimate;
+    estimate.*setting = value;
+    return estimate;
+  };
+  std::vector<ForceEstimate> refused{
+      with(&ForceEstimate::gain, 1.1), {.force = {0, nan, 0}}, {.force = {HUGE_VAL, 0, 0}}};
+  for (double ForceEstimate::* const setting : {&ForceEstimate::gain, &ForceEstimate::softest, &ForceEstimate::largest})
+    for (const double bad : {nan, -1.0, HUGE_VAL}) refused.push_back(with(setting, bad));
+  Loop loop;
+  const Measurement<3> measured{loop.start,
+                                loop.system.sensor.T_tracker_base * Pose{Mat3::Identity(), loop.at + Vec3(0, 1e-4, 0)}};
+  for (const ForceEstimate& estimate : refused) {
+    EXPECT_EQ(estimate.check(), Status::invalid_settings);
+    ForceEstimate alone = estimate;
+    alone.update(0.1 * Mat3::Identity(), Vec3::Constant(1e-3));
+    if (estimate.force.allFinite()) {
+      EXPECT_EQ(alone.force, estimate.force);
+    }
+    Controller<3> controller(loop.system, {}, period);
+    controller.estimate = estimate;
+    MotorAngles<3> v{Vec3::Ones(), Vec3::Ones()};
+    EXPECT_EQ(controller.advance(measured, {{Mat3::Identity(), loop.at}}, {}, v).status, Status::ok)
+        << "it is not used";
+    controller.tip_force = TipForce::estimated;
+    EXPECT_EQ(controller.advance(measured, {{Mat3::Identity(), loop.at}}, {}, v).status, Status::invalid_settings);
+    EXPECT_EQ(v.translation.norm() + v.rotation.norm(), 0);
+    controller.estimate = {};
+    EXPECT_EQ(controller.advance(measured, {{Mat3::Identity(), loop.at}}, {}, v).status, Status::ok);
+  }
+}
+
 /// Equal tubes turned against each other, curved so much that they almost snap.
 TEST(Controller, StandsStillBeforeASnap) {
   const auto robot_of = [](double curvature) {

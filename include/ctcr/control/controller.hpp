@@ -85,14 +85,19 @@ public:
   /// @return status ok; that of the model: singular: it is about to snap, and its Jacobian leads nowhere; singular: the
   ///         goals leave a direction free; not_finite: a motor angle, reading, reference or goal is NaN or too large,
   ///         the rotation of the reading or the reference is none (is_rotation()), or the reading is farther from the front
-  ///         plate than twice the length of the robot; invalid_settings: those given to the constructor, or a
-  ///         negative weight. What is refused stays out of the memory of effects, force and warm start.
+  ///         plate than twice the length of the robot; invalid_settings: those given to the constructor, those of the
+  ///         estimate where it is used (ForceEstimate::check()), or a negative weight. What is refused stays out of the memory
+  ///         of effects, force and warm start.
   ControlReport<Tasks> advance(const Measurement<N>& measured, const Reference& reference, const TipLoad& load,
                                MotorAngles<N>& velocity) noexcept {
     ControlReport<Tasks> report;
     velocity = {};
     if (settings_ != Status::ok) {
       report.status = settings_;
+      return report;
+    }
+    if (tip_force == TipForce::estimated && estimate.check() != Status::ok) {
+      report.status = estimate.check();
       return report;
     }
     Pose tip = tip_of(system_.sensor, measured.reading);
