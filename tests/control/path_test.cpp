@@ -53,12 +53,40 @@ TEST(Trapezoid, DurationAndSymmetryInClosedForm) {
   EXPECT_EQ(Trapezoid(0, 1, 1).duration(), 0);
 }
 
+/// One infinite limit is no limit; two leave no time, and the motion is refused as one without speed is.
+TEST(Trapezoid, InfinityIsNoBound) {
+  Random random(23);
+  for (int n = 0; n < test::cases(500); ++n) {
+    const double length = uniform(random, 1e-4, 0.2), limit = std::pow(10, uniform(random, -3, 1));
+    const Trapezoid any_speed(length, HUGE_VAL, limit), any_acceleration(length, limit, HUGE_VAL);
+    EXPECT_NEAR(any_speed.duration(), 2 * std::sqrt(length / limit), 1e-12 * any_speed.duration());
+    EXPECT_NEAR(any_acceleration.duration(), length / limit, 1e-12 * any_acceleration.duration());
+    for (const Trapezoid& motion : {any_speed, any_acceleration}) {
+      EXPECT_EQ(motion.check(), Status::ok);
+      EXPECT_NEAR(motion.at(0.5 * motion.duration()).position, 0.5 * length, 1e-12);
+      EXPECT_EQ(motion.at(motion.duration()).position, length);
+    }
+    EXPECT_EQ(any_acceleration.at(1e-3 * any_acceleration.duration()).velocity, limit);
+  }
+  EXPECT_EQ(Trapezoid(0, 1, 1).check(), Status::ok);
+  EXPECT_NEAR(Trapezoid(1e-200, 1, 1e-200).duration(), 2, 1e-12) << "however small the numbers";
+}
+
 TEST(Paths, WithoutSpeedTheyRestAtTheirStart) {
   const std::vector<Vec3> points{{0, 0, 0.1}, {0.01, 0, 0.1}, {0.02, 0.01, 0.1}, {0.03, 0.01, 0.12}};
-  for (const auto& [speed, acceleration] :
-       {std::pair{0.0, 1.0}, {1.0, 0.0}, {-1.0, 1.0}, {1.0, -1.0}, {std::nan(""), 1.0}, {1.0, std::nan("")}}) {
+  for (const auto& [speed, acceleration] : {std::pair{0.0, 1.0},
+                                            {1.0, 0.0},
+                                            {-1.0, 1.0},
+                                            {1.0, -1.0},
+                                            {std::nan(""), 1.0},
+                                            {1.0, std::nan("")},
+                                            {HUGE_VAL, HUGE_VAL},
+                                            {1e-320, 1.0}}) {
     const Polyline line(points, speed, acceleration);
     const SplinePath curve(points, speed, acceleration);
+    EXPECT_EQ(Trapezoid(0.1, speed, acceleration).check(), Status::invalid_settings);
+    EXPECT_EQ(line.check(), Status::invalid_settings);
+    EXPECT_EQ(curve.check(), Status::invalid_settings);
     EXPECT_EQ(line.duration(), 0);
     EXPECT_EQ(curve.duration(), 0);
     for (const double t : {-1.0, 0.0, 1.0, 1e6})
@@ -66,6 +94,17 @@ TEST(Paths, WithoutSpeedTheyRestAtTheirStart) {
         EXPECT_LT((r.pose.position - points.front()).norm(), 1e-12);
         EXPECT_EQ(r.velocity.norm(), 0);
       }
+  }
+}
+
+TEST(Paths, WithoutAnOrientationTheyRestAtTheirStart) {
+  const std::vector<Vec3> points{{0, 0, 0.1}, {0.01, 0, 0.1}, {0.02, 0.01, 0.1}, {0.03, 0.01, 0.12}};
+  for (const Mat3& none : {Mat3(Mat3::Zero()), Mat3(-Mat3::Identity()), Mat3(Mat3::Constant(std::nan("")))}) {
+    const Polyline line(points, 1, 1, none);
+    const SplinePath curve(points, 1, 1, none);
+    EXPECT_EQ(line.check(), Status::invalid_settings);
+    EXPECT_EQ(curve.check(), Status::invalid_settings);
+    EXPECT_EQ(line.duration() + curve.duration(), 0);
   }
 }
 

@@ -16,20 +16,25 @@ public:
   /// @param corners  [m], base frame   @param orientation  of the tip, all along
   /// Allocates. speed and acceleration as Trapezoid.
   Polyline(std::span<const Vec3> corners, double speed, double acceleration, const Mat3& orientation = Mat3::Identity())
-    : orientation_(orientation), start_(detail::first_of(corners)), is_way_(detail::are_a_way(corners, -1)) {
-    if (!is_way_) return;
-    for (std::size_t i = 1; i < corners.size(); ++i) {
+    : orientation_(orientation), start_(detail::first_of(corners)) {
+    if (!detail::are_a_way(corners, -1) || !is_rotation(orientation)) return;
+    status_ = Trapezoid(0, speed, acceleration).check();
+    for (std::size_t i = 1; i < corners.size() && status_ == Status::ok; ++i) {
       const Vec3 way = corners[i] - corners[i - 1];
       const double length = way.norm();
       const Trapezoid motion(length, speed, acceleration);
-      if (!(motion.duration() > 0)) continue;  // no way, or no speed: it rests where it is
+      status_ = motion.check();
+      if (!(motion.duration() > 0)) continue;  // no way: it rests where it is
       edges_.push_back({corners[i - 1], way / length, motion, duration_});
       duration_ += motion.duration();
     }
+    if (!(duration_ < HUGE_VAL)) status_ = Status::invalid_settings;
+    if (status_ != Status::ok) edges_.clear(), duration_ = 0;
   }
 
-  /// ok; invalid_settings: there is no corner, or one is not finite. Real time: yes.
-  [[nodiscard]] Status check() const noexcept { return is_way_ ? Status::ok : Status::invalid_settings; }
+  /// ok; invalid_settings: there is no corner, one is not finite, the orientation is no rotation, or an edge no motion
+  /// (Trapezoid::check()). Real time: yes.
+  [[nodiscard]] Status check() const noexcept { return status_; }
   /// Time from start to end [s]. Real time: yes.
   [[nodiscard]] double duration() const noexcept { return duration_; }
 
@@ -56,7 +61,7 @@ private:
   std::vector<Edge> edges_;
   Mat3 orientation_;
   Vec3 start_;
-  bool is_way_;
+  Status status_ = Status::invalid_settings;
   double duration_ = 0;
 };
 

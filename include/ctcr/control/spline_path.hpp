@@ -20,7 +20,7 @@ public:
   SplinePath(std::span<const Vec3> points, double speed, double acceleration,
              const Mat3& orientation = Mat3::Identity())
     : orientation_(orientation), start_(detail::first_of(points)) {
-    if (points.size() < 4 || !detail::are_a_way(points, 0)) return;
+    if (points.size() < 4 || !detail::are_a_way(points, 0) || !is_rotation(orientation)) return;
     Eigen::Matrix3Xd columns(3, Eigen::Index(points.size()));
     for (std::size_t i = 0; i < points.size(); ++i) columns.col(Eigen::Index(i)) = points[i];
     curve_ = Eigen::SplineFitting<Curve>::Interpolate(columns, 3);
@@ -31,8 +31,9 @@ public:
     motion_ = {arc_length_.back(), speed, acceleration};
   }
 
-  /// ok; invalid_settings: there are fewer than 4 points, one is not finite, or two in a row are the same. Real time: yes.
-  [[nodiscard]] Status check() const noexcept { return length() > 0 ? Status::ok : Status::invalid_settings; }
+  /// ok; invalid_settings: there are fewer than 4 points, one is not finite, two in a row are the same, the orientation is
+  /// no rotation, or all is no motion (Trapezoid::check()). Real time: yes.
+  [[nodiscard]] Status check() const noexcept { return motion_.check(); }
   /// Of the curve [m]. Real time: yes.
   [[nodiscard]] double length() const noexcept { return arc_length_.back(); }
   /// Time from start to end [s]. Real time: yes.

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ctcr/core/status.hpp"
+
 namespace ctcr {
 
 /// Speeds up at `acceleration`, travels at `speed`, slows down at `acceleration`; a line too short for that speed has
-/// no travel at it. Without speed or acceleration it rests at the start. Exact at any time. Real time: yes.
+/// no travel at it. What is no motion, see check(), rests at the start. Exact at any time. Real time: yes.
 class Trapezoid {
 public:
   struct Point {
@@ -15,14 +17,17 @@ public:
 
   Trapezoid() noexcept = default;
   /// @param length  [m], >= 0   @param speed  [m/s], > 0   @param acceleration  [m/s^2], > 0
+  /// Infinity is no bound. It may stand for speed or acceleration, not for both: the motion would take no time.
   Trapezoid(double length, double speed, double acceleration) noexcept {
-    if (!(length > 0 && speed > 0 && acceleration > 0)) return;
-    length_ = length;
-    speed_ = std::min(speed, std::sqrt(length * acceleration));
-    acceleration_ = acceleration;
-    ramp_ = speed_ / acceleration;
-    duration_ = length / speed_ + ramp_;
+    const double fastest = std::min(speed, std::sqrt(length) * std::sqrt(acceleration)), ramp = fastest / acceleration;
+    const double duration = length > 0 ? length / fastest + ramp : 0;
+    if (!(length >= 0 && speed > 0 && acceleration > 0 && duration < HUGE_VAL)) return;
+    status_ = Status::ok;
+    length_ = length, speed_ = fastest, acceleration_ = acceleration, ramp_ = ramp, duration_ = duration;
   }
+
+  /// ok; invalid_settings: length, speed or acceleration is NaN or out of range, or the time that they take is no number.
+  [[nodiscard]] Status check() const noexcept { return status_; }
 
   /// Time from start to end [s].
   [[nodiscard]] double duration() const noexcept { return duration_; }
@@ -39,6 +44,7 @@ public:
 
 private:
   double length_ = 0, speed_ = 0, acceleration_ = 1, ramp_ = 0, duration_ = 0;
+  Status status_ = Status::invalid_settings;
 };
 
 }  // namespace ctcr

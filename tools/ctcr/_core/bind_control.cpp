@@ -21,7 +21,8 @@ namespace ctcr::python {
 
 AnyPath path_through(const std::vector<Vec3>& points, bool spline, double speed, double acceleration) {
   const auto any = [](const auto& path) {
-    if (path.check() != Status::ok) throw std::invalid_argument("no path leads through these points");
+    if (path.check() != Status::ok)
+      throw std::invalid_argument("no path leads through these points at this speed and acceleration");
     return AnyPath{[path](double t) { return path.at(t); }, path.duration()};
   };
   return spline ? any(SplinePath(points, speed, acceleration)) : any(Polyline(points, speed, acceleration));
