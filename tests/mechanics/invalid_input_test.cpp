@@ -121,5 +121,31 @@ TEST(InvalidInput, WithoutEvaluationsNothingConverges) {
   }
 }
 
+/// At most max_iterations evaluations, or 4 where that is less, whatever tolerance and accuracy are asked.
+TEST(InvalidInput, NoSolveTakesMoreThanItsIterations) {
+  test::Random random(3);
+  const auto power = [&](double low, double high) { return std::pow(10, test::uniform(random, low, high)); };
+  for (int n = 0; n < test::cases(600); ++n) {
+    Robot<3> any = robot;
+    if (n % 3 == 0) any.gravity = Vec3(0, -9.81, 0);
+    if (n % 5 == 0)
+      for (Tube& tube : any.tubes) tube.curvature *= 4;
+    const Settings settings{.max_iterations = int(test::uniform(random, -1, 40)),
+                            .tolerance = power(-12, 0.5),
+                            .accuracy = power(-12, -2),
+                            .max_steps = 200};
+    const Model<3> model(any);
+    const TipLoad load = n % 2 == 0 ? TipLoad{} : test::random_load(random, power(-3, 1), 0.01);
+    Joints<3> q = test::random_joints(any, random);
+    Workspace<3> ws;
+    Solution<3> s;
+    for (int warm = 0; warm < 3; ++warm) {
+      (void)solve<Derivatives::jacobian>(model, q, load, ws, s, settings);
+      EXPECT_LE(s.iterations, std::max(settings.max_iterations, 4));
+      q.alpha.array() += test::uniform(random, -0.5, 0.5);
+    }
+  }
+}
+
 }  // namespace invalid_input_test
 }  // namespace ctcr

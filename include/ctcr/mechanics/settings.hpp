@@ -3,7 +3,7 @@
 namespace ctcr {
 
 struct Settings {
-  int max_iterations = 300;  ///< evaluations after which a solve is given up
+  int max_iterations = 300;  ///< evaluations after which a solve is given up; it takes up to 4 in any case
   double tolerance = 1e-10;  ///< on ||b|| [rad], and on the force of contacts at the tip [N]
   int steps = 1;             ///< factor on the integration steps of every segment to begin with, >= 1
   /// Largest error of integration at the tip, as a part of the robot's length: solve() takes more steps until its

@@ -314,6 +314,7 @@ inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipL
   TipGuess<N> guess;
   const auto solved = [&] { return ev.residual < settings.tolerance; };
   const auto way = [&] { return way_of(model, q, load, guess, ws); };
+  // What begins with some left goes beyond it by less than the reserve; without any, a cold solve takes 4.
   const auto left = [&] { return std::max(settings.max_iterations, 0) - reserve - out.iterations; };
   bool stable = false;
   const auto attempt = [&](int most) {
@@ -369,7 +370,7 @@ inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipL
     while (!(error <= allowed) && stable) {
       error = integration_error<L, Stepper>(c, q, load, guess, steps, {ev.rotation, ev.position}, lever * length);
       ++out.iterations;
-      if (error <= allowed || steps.times >= most) break;
+      if (error <= allowed || steps.times >= most || left() <= 0) break;
       steps.times = refined(steps.times, error, allowed, most);
       search(true);
     }
@@ -489,9 +490,9 @@ inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipL
 /// @return ok: an equilibrium, stable, to the asked accuracy; invalid_robot, joints_out_of_order, tip_behind_plate: input
 ///         refused, nothing computed; not_finite: the same, or a result that is no number; not_converged: best iterate;
 ///         singular: solved, but about to snap; unstable: only an unstable equilibrium was found; inaccurate: solved, but
-///         max_steps leave a larger error of integration than `settings.accuracy` asks for
-/// Real time: yes; at most settings.max_iterations evaluations, 1 to 3 from a warm start, and one more where the robot has
-/// moved by more than 0.05 rad since its integration error was last estimated.
+///         max_steps or max_iterations leave a larger error of integration than `settings.accuracy` asks for
+/// Real time: yes; at most settings.max_iterations evaluations (4 where that is less), 1 to 3 from a warm start, and one
+/// more where the robot has moved by more than 0.05 rad since its integration error was last estimated.
 /// Ref: Boyer et al., eqs. (1)-(3); Rucker & Webster 2011 for J and C.
 template <Derivatives D = Derivatives::none, class Stepper = MagnusRk4, int N, class Fx>
 CTCR_NOINLINE Status solve(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
