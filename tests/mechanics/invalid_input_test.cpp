@@ -147,5 +147,33 @@ TEST(InvalidInput, NoSolveTakesMoreThanItsIterations) {
   }
 }
 
+/// A load that is too small to bend anything leaves the robot as it is without, and its derivatives as they are of a small
+/// load, whether squares of it underflow or not.
+TEST(InvalidInput, TheSmallestLoads) {
+  for (const Vec3& direction : {Vec3(0, -1, 0), Vec3(1, 0, 0), Vec3(0.3, 0.4, -0.5)})
+    for (const double size : {5e-324, 1e-310, 1e-300, 1e-163, 1e-158, 1e-154, 1e-150, 1e-20}) {
+      const TipLoad force{.force = size * direction}, moment{.moment = size * direction};
+      for (const TipLoad& load : {force, moment}) {
+        const Model<3> model(robot);
+        const auto expect_as_without = [&](auto derivatives) {
+          constexpr Derivatives D = decltype(derivatives)::value;
+          Workspace<3> ws, none;
+          Solution<3> s, without;
+          ASSERT_EQ(solve<D>(model, good, {}, none, without), Status::ok);
+          for (const bool warm : {false, true}) {
+            ASSERT_EQ(solve<D>(model, good, load, ws, s), Status::ok) << size << (warm ? " warm" : " cold");
+            EXPECT_LT((s.position - without.position).norm(), 1e-5);
+            EXPECT_LT((s.jacobian - without.jacobian).cwiseAbs().maxCoeff(), 1e-3);
+            EXPECT_LE((s.compliance - without.compliance).norm(), 1e-3 * without.compliance.norm());
+            ASSERT_EQ(step<D>(model, good, load, ws, s), Status::ok);
+          }
+        };
+        expect_as_without(std::integral_constant<Derivatives, Derivatives::none>{});
+        expect_as_without(std::integral_constant<Derivatives, Derivatives::jacobian>{});
+        expect_as_without(std::integral_constant<Derivatives, all>{});
+      }
+    }
+}
+
 }  // namespace invalid_input_test
 }  // namespace ctcr

@@ -461,12 +461,15 @@ inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipL
   if (out.status == Status::ok && !all_finite(load.force, load.moment)) out.status = Status::not_finite;
   if (out.status != Status::ok) return blank(out.status, out);
   using enum Loading;
+  // The equations of a force alone need its direction, which one has whose square does not underflow.
+  const bool pulls = !load.force.isZero(0.0),
+             has_direction = load.force.squaredNorm() >= std::numeric_limits<double>::min();
   if constexpr (!Fx::none || is_for_comparison<Stepper>)
     out.status = run(std::integral_constant<Loading, weight>{});
   else if (!model.coefficients().gravity.isZero(0.0) || !load.moment.isZero(0.0) ||
-           (D == Derivatives::compliance && load.force.isZero(0.0)))
+           ((D == Derivatives::compliance || pulls) && !has_direction))
     out.status = run(std::integral_constant<Loading, weight>{});
-  else if (D == Derivatives::compliance || !load.force.isZero(0.0))
+  else if (D == Derivatives::compliance || pulls)
     out.status = run(std::integral_constant<Loading, force>{});
   else if constexpr (D != Derivatives::compliance)
     out.status = run(std::integral_constant<Loading, none>{});
