@@ -31,6 +31,24 @@ TEST(Transmission, IsInvertible) {
   }
 }
 
+TEST(Transmission, IsRefusedWhereItMovesNothing) {
+  test::Random random(3);
+  const Transmission<3> good = random_transmission<3>(random);
+  EXPECT_EQ(check_transmission(good), Status::ok);
+  for (double Transmission<3>::* const ratio : {&Transmission<3>::translation_ratio, &Transmission<3>::rotation_ratio})
+    for (const double bad : {0.0, 5e-324, std::nan(""), HUGE_VAL}) {
+      Transmission<3> t = good;
+      t.*ratio = bad;
+      EXPECT_EQ(check_transmission(t), Status::invalid_settings);
+    }
+  for (VecN<3> Transmission<3>::* const home : {&Transmission<3>::home_translation, &Transmission<3>::home_rotation})
+    for (const double bad : {std::nan(""), -HUGE_VAL}) {
+      Transmission<3> t = good;
+      (t.*home)[1] = bad;
+      EXPECT_EQ(check_transmission(t), Status::invalid_settings);
+    }
+}
+
 TEST(Transmission, MotorsAtZeroHoldTheHome) {
   test::Random random(2);
   const Transmission<4> t = random_transmission<4>(random);

@@ -152,6 +152,13 @@ TEST(Controller, SettingsThatMeanNothingAreRefused) {
   expect_refused({}, HUGE_VAL);
   expect_refused({.base_gap = 0.2}, period);  // allows no joints at all
   expect_refused({.beta_low = Vec3(-0.1, -1, -1), .beta_high = Vec3(-0.2, 0, 0)}, period);
+  for (double Transmission<3>::* const ratio :
+       {&Transmission<3>::translation_ratio, &Transmission<3>::rotation_ratio}) {
+    const Transmission<3> good = loop.system.transmission;
+    loop.system.transmission.*ratio = 0;
+    expect_refused({}, period);
+    loop.system.transmission = good;
+  }
   const PoseSensor good = loop.system.sensor;
   for (const int tube : {-1, 1, 3}) {
     loop.system.sensor.tube = tube;

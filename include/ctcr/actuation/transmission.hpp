@@ -1,4 +1,7 @@
 #pragma once
+#include <cmath>
+
+#include "ctcr/core/status.hpp"
 #include "ctcr/robot/joints.hpp"
 
 namespace ctcr {
@@ -19,6 +22,16 @@ struct Transmission {
   VecN<N> home_translation = VecN<N>::Zero();  ///< Delta of beta [m]
   VecN<N> home_rotation = VecN<N>::Zero();     ///< Delta of alpha [rad]
 };
+
+/// Whether the motors can move the joints and be told how: ratios and their inverses are finite, and so are the homes.
+/// @return ok or invalid_settings. Real time: yes.
+template <int N>
+[[nodiscard]] Status check_transmission(const Transmission<N>& t) noexcept {
+  const auto is_ratio = [](double ratio) { return std::abs(ratio) < HUGE_VAL && std::abs(1 / ratio) < HUGE_VAL; };
+  const bool possible =
+      is_ratio(t.translation_ratio) && is_ratio(t.rotation_ratio) && all_finite(t.home_translation, t.home_rotation);
+  return possible ? Status::ok : Status::invalid_settings;
+}
 
 /// Joints that the motors hold. Real time: yes.
 template <int N>

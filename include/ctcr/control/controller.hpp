@@ -54,8 +54,8 @@ public:
 
   /// @param system  the sensor sits on the innermost tube   @param period  of the calls [s], > 0
   /// A robot that cannot exist is answered by invalid_robot in all calls, and settings that mean nothing by
-  /// invalid_settings: check_limits(), limits that allow no joints at all, the period, check_sensor(), a sensor on
-  /// another tube.
+  /// invalid_settings: check_limits(), limits that allow no joints at all, the period, check_transmission(),
+  /// check_sensor(), a sensor on another tube.
   Controller(const System<N, Fx>& system, const Limits<N>& limits, double period, const Tasks& wanted = {}) noexcept
     : tasks(wanted),
       system_(system),
@@ -169,8 +169,9 @@ private:
 
   [[nodiscard]] Status check_settings() const noexcept {
     if (system_.model.check() != Status::ok) return system_.model.check();
-    const bool possible = period_ > 0 && period_ < HUGE_VAL && check_sensor(system_.sensor, 1) == Status::ok &&
-                          check_limits(limits_) == Status::ok && allowed_.exist();
+    const bool possible = period_ > 0 && period_ < HUGE_VAL && check_transmission(system_.transmission) == Status::ok &&
+                          check_sensor(system_.sensor, 1) == Status::ok && check_limits(limits_) == Status::ok &&
+                          allowed_.exist();
     return possible ? Status::ok : Status::invalid_settings;
   }
 
