@@ -432,6 +432,17 @@ TEST(Controller, DoesNotAllocateNorThrow) {
     }
 }
 
+TEST(SimulatedRobot, RefusesASensorThatItCannotCarry) {
+  Loop loop;
+  for (const int tube : {-1, 3}) {
+    loop.system.sensor.tube = tube;
+    SimulatedRobot<3> robot(loop.system, loop.start, {});
+    Measurement<3> measured;
+    EXPECT_EQ(robot.measure(measured), Status::invalid_settings);
+    EXPECT_TRUE(measured.reading.position.allFinite());
+  }
+}
+
 TEST(SimulatedRobot, IsItsModelPlusNoise) {
   Loop loop;
   SimulatedRobot<3> robot(loop.system, loop.start, {}, {35e-6, 1e-3}, 5),

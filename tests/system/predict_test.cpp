@@ -140,7 +140,28 @@ TEST(Predict, Failure) {
   ASSERT_EQ(predict(system, refused, load, ws, prediction), Status::joints_out_of_order);
   PredictionDerivatives<3> derivatives;
   EXPECT_EQ(differentiate(system, refused, ws, prediction, derivatives), Status::joints_out_of_order);
-  EXPECT_TRUE(derivatives.by_motors.isZero(0));
+  EXPECT_TRUE(derivatives.by_motors.isZero(0) && derivatives.by_parameters.isZero(0));
+}
+
+/// A sensor on a tube that is not there, or with a rotation that is none, is refused; all outputs are defined.
+TEST(Predict, Sensor) {
+  test::Random random(4);
+  const auto [good, theta, load] = random_command<3>(false, 0, random);
+  System<3> beyond = good, behind = good, turned = good;
+  beyond.sensor.tube = 3;
+  behind.sensor.tube = -1;
+  turned.sensor.T_tracker_base.rotation *= std::nan("");
+  for (const System<3>& system : {beyond, behind, turned}) {
+    Workspace<3> ws;
+    Prediction<3> prediction;
+    ASSERT_EQ(predict(good, theta, load, ws, prediction), Status::ok);
+    EXPECT_EQ(predict(system, theta, load, ws, prediction), Status::invalid_settings);
+    EXPECT_EQ(prediction.solution.status, Status::invalid_settings);
+    EXPECT_TRUE(prediction.reading.rotation.isIdentity(0) && prediction.reading.position.isZero(0));
+    PredictionDerivatives<3> derivatives;
+    EXPECT_EQ(differentiate(system, theta, ws, prediction, derivatives), Status::invalid_settings);
+    EXPECT_TRUE(derivatives.by_motors.isZero(0) && derivatives.by_parameters.isZero(0));
+  }
 }
 
 TEST(Predict, NoAllocation) {

@@ -76,13 +76,16 @@ Status solve_in_surroundings(Workspace<N>& ws, RecordedPrediction<N, Fx>& out, c
 
 /// Reading of the tracker in a row.
 /// @param history  of this row, as histories() gives it
-/// @return as solve(), not_finite where a parameter of an effect is not a number, not_converged where the tip and its
-///         surroundings find no balance. Real time: yes.
+/// @return as solve(), invalid_settings: check_sensor(), nothing is computed; not_finite where a parameter of an effect is
+///         not a number, not_converged where the tip and its surroundings find no balance. Real time: yes.
 template <int N, class Fx>
   requires(!Fx::none)
 CTCR_NOINLINE Status predict(const System<N, Fx>& system, const RecordedRow<N>& row,
                              const typename Fx::template On<N>::History& history, Workspace<N>& ws,
                              RecordedPrediction<N, Fx>& out) noexcept {
+  out.reading = {};
+  out.solution.iterations = 0;
+  if (check_sensor(system.sensor, N) != Status::ok) return detail::blank(Status::invalid_settings, out.solution);
   auto effects = system.model.effects();
   effects.set_history(history);
   std::array<double, N> beta, alpha;

@@ -29,7 +29,9 @@ public:
       noise_(noise),
       random_(seed),
       live_(system.model),
-      model_(system.model) {
+      model_(system.model),
+      sensor_(check_sensor(system.sensor, N)) {
+    if (sensor_ != Status::ok) system_.sensor = {};
     settle();
   }
 
@@ -41,6 +43,7 @@ public:
     return solution_.status == Status::singular ? Status::ok : solution_.status;
   }
 
+  /// @return invalid_settings: check_sensor(), it reads the tip instead; else as solve(), singular is ok
   Status measure(Measurement<N>& out) noexcept {
     out.theta = theta_;
     const Pose exact = exact_reading();
@@ -49,6 +52,7 @@ public:
     };
     out.reading.position = exact.position + three(noise_.position);
     out.reading.rotation = rotation_matrix(three(noise_.rotation)) * exact.rotation;
+    if (sensor_ != Status::ok) return sensor_;
     return solution_.status == Status::singular ? Status::ok : solution_.status;
   }
 
@@ -85,6 +89,7 @@ private:
   std::normal_distribution<double> normal_;
   LiveEffects<N, Fx> live_;
   Model<N, Fx> model_;
+  Status sensor_;
   double time_ = 0;
   Workspace<N> ws_;
   Solution<N> solution_;

@@ -18,11 +18,14 @@ struct Prediction {
 };
 
 /// What the tracker will read when the motors stand at theta and `load` acts on the robot tip.
-/// @return as solve(). Real time: yes.
+/// @return as solve(); invalid_settings: check_sensor(), nothing is computed. Real time: yes.
 template <int N>
 Status predict(const System<N>& system, const MotorAngles<N>& theta, const TipLoad& load, Workspace<N>& ws,
                Prediction<N>& out) noexcept {
   out.q = joints(system.transmission, theta);
+  out.reading = {};
+  out.solution.iterations = 0;
+  if (check_sensor(system.sensor, N) != Status::ok) return detail::blank(Status::invalid_settings, out.solution);
   const Status status = solve(system.model, out.q, load, ws, out.solution, system.settings);
   out.reading = reading(system.sensor, out.solution.tube_tips);
   return status;
@@ -36,16 +39,19 @@ struct PredictionDerivatives {
 };
 
 /// Derivative of the reading that predict() just left in `ws` and `prediction`.
-/// @return the status of the prediction where that failed, else as differentiate_tip(). Real time: yes.
+/// @return the status of the prediction where that failed, with derivatives of zero; else as differentiate_tip(). Real
+/// time: yes.
 template <int N>
 Status differentiate(const System<N>& system, const MotorAngles<N>& theta, const Workspace<N>& ws,
                      const Prediction<N>& prediction, PredictionDerivatives<N>& out) noexcept {
   using P = ParameterVector<N>;
   const Transmission<N>& transmission = system.transmission;
   const auto columns = [&](Parameter kind) { return out.by_parameters.middleCols(P::index(kind), P::size(kind)); };
-  Status status = prediction.solution.status;
+  out.by_motors.setZero();
+  out.by_parameters.setZero();
+  if (!has_equilibrium(prediction.solution.status)) return prediction.solution.status;
   TipDerivatives<N> tip;
-  if (has_equilibrium(status)) status = differentiate_tip(system.model, ws, system.sensor.tube, tip);
+  const Status status = differentiate_tip(system.model, ws, system.sensor.tube, tip);
   const Mat6 by_tip = reading_by_tip(system.sensor, prediction.reading),
              by_frame = reading_by_frame(system.sensor, prediction.reading),
              by_mount = reading_by_mount(system.sensor, prediction.reading);
