@@ -138,9 +138,9 @@ TEST(Limits, NumbersThatAreNoLimitsAreFound) {
 TEST(Limits, WithoutSpeedTheRobotStands) {
   Random random(14);
   const Robot<3> robot = test::paper_robot();
-  for (const bool turns : {false, true}) {
+  for (const auto& [turns, nothing] : {std::pair{false, 0.0}, {false, -0.0}, {true, 0.0}, {true, -0.0}}) {
     Limits<3> limits{.base_gap = 20e-3};
-    (turns ? limits.rotation_speed : limits.translation_speed) = 0;
+    (turns ? limits.rotation_speed : limits.translation_speed) = nothing;
     for (const Vec3& beta : {Vec3(-0.3, -0.2, -0.1), Vec3(-0.205, -0.202, -0.1)}) {
       JointVelocity<3> v;
       LimitReport report;

@@ -144,20 +144,20 @@ Status limited_minimum(LeastSquares<N> goals, const AllowedPositions<N>& allowed
     status = goals.minimum(velocity);
   }
   if (status != Status::ok) return status;
-  // Where a limit is 0, no speed is left; 0 / 0 is none that is too high.
-  const double excess =
-      std::max(std::max(1.0, velocity.template head<N>().cwiseAbs().maxCoeff() / limits.translation_speed),
-               velocity.template tail<N>().cwiseAbs().maxCoeff() / limits.rotation_speed);
-  if (excess > 1) {
-    velocity /= excess;
+  // Where a limit is 0 or -0, no speed is left; 0 / 0 is none that is too high.
+  const auto part = [](const VecN<N>& v, double limit) { return std::min(1.0, limit / v.cwiseAbs().maxCoeff()); };
+  const double kept = std::min(part(velocity.template head<N>(), limits.translation_speed),
+                               part(velocity.template tail<N>(), limits.rotation_speed));
+  if (kept < 1) {
+    velocity *= kept;
     report.speed = true;
   }
   const VecN<N> planned = beta + period * velocity.template head<N>();
   velocity.template head<N>() = (allowed.clamped(planned, &report) - beta) / period;
   // From outside the allowed positions the way back takes several periods.
-  const double hurry = velocity.template head<N>().cwiseAbs().maxCoeff() / limits.translation_speed;
-  if (hurry > 1 + 1e-9) {
-    velocity.template head<N>() /= hurry;
+  const double back = part(velocity.template head<N>(), limits.translation_speed);
+  if (back < 1 - 1e-9) {
+    velocity.template head<N>() *= back;
     report.speed = true;
   }
   return Status::ok;
