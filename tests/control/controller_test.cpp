@@ -228,6 +228,20 @@ TEST(Controller, GoalsThatAreNoNumbersAreRefused) {
   EXPECT_EQ(report.gave_way(), 0b1010u) << "of a shortfall that is no number nobody knows that it is small";
 }
 
+/// Whatever is refused, the report holds numbers: a load that is none is not repeated in it.
+TEST(Controller, ReportsNumbers) {
+  Loop loop;
+  const Measurement<3> measured{loop.start, {Mat3::Identity(), loop.at}};
+  for (const TipLoad& load : {TipLoad{.force = {0, std::nan(""), 0}}, TipLoad{.force = {HUGE_VAL, 0, 0}}}) {
+    Controller<3> controller(loop.system, {}, period);
+    controller.tip_force = TipForce::known;
+    MotorAngles<3> v;
+    const auto report = controller.advance(measured, {}, load, v);
+    EXPECT_EQ(report.status, Status::not_finite);
+    EXPECT_TRUE(report.force.allFinite() && std::isfinite(report.stability));
+  }
+}
+
 /// One reading that is missing or far off, whatever is made of the force: later periods are as if it had never been.
 TEST(Controller, RecoversFromAWrongReading) {
   constexpr double missing = -3.697314e28;  // a tracker's value where it sees nothing

@@ -104,7 +104,7 @@ public:
     TipLoad acting = load;
     if (tip_force != TipForce::known)
       acting.force = tip_force == TipForce::estimated ? estimate.force : Vec3(Vec3::Zero());
-    report.force = acting.force;
+    if (all_finite(acting.force)) report.force = acting.force;
     const Joints<N> motors = joints(system_.transmission, measured.theta);
     const Joints<N> q = tip_force == TipForce::estimated ? settle<Derivatives::compliance>(now_, motors, acting)
                                                          : settle<Derivatives::jacobian>(now_, motors, acting);
