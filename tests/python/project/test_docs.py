@@ -23,6 +23,7 @@ DOCUMENTS = [
         path for folder in ("docs", "include", "examples", "bench", "tools") for path in (ROOT / folder).rglob("*.md")
     ),
 ]
+RUN = ("tools/dev", ".venv/bin/ctcr", "c++", "build/")  # what commands begin with
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -49,7 +50,7 @@ def all_blocks(language: str) -> list:
 
 def commands(block: str) -> list[str]:
     lines = block.replace("\\\n", " ").splitlines()
-    return [line.split(" #")[0].strip() for line in lines if line.startswith(("tools/dev", ".venv/bin/ctcr"))]
+    return [line.split(" #")[0].strip() for line in lines if line.startswith(RUN)]
 
 
 def missing_lines(excerpt: str, printed: str) -> list[str]:
@@ -68,7 +69,8 @@ def missing_lines(excerpt: str, printed: str) -> list[str]:
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
     """A folder that looks like the project to a command, but keeps what the command writes away from it."""
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    for folder in ("examples", "include"):
+        (tmp_path / folder).symlink_to(ROOT / folder)
     (tmp_path / ".venv").symlink_to(sys.prefix)
     (tmp_path / "build").mkdir()
     return tmp_path
