@@ -120,7 +120,10 @@ TEST(Controller, RefusesRotationsThatAreNone) {
       nowhere.pose.rotation = none;
       for (const auto& [measured, reference] : {std::pair{bad, Reference{}}, {good, nowhere}}) {
         MotorAngles<3> v{Vec3::Ones(), Vec3::Ones()};
-        EXPECT_EQ(controller.advance(measured, reference, {}, v).status, Status::not_finite);
+        const test::HeapGuard guard;
+        const Status status = controller.advance(measured, reference, {}, v).status;
+        EXPECT_EQ(guard.uses(), 0);
+        EXPECT_EQ(status, Status::not_finite);
         EXPECT_EQ(v.translation.norm() + v.rotation.norm(), 0);
       }
     }
