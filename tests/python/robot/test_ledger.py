@@ -45,15 +45,77 @@ def test_layout(tmp_path):
 
 @pytest.mark.parametrize("n", range(1, 5))
 def test_new_file_changed(tmp_path, n):
-    """A file of `ctcr init` stays as it is but for new homes: what is not known stays `null`, and the comment above a
-    section stays directly above it."""
+    """A file of `ctcr init` stays as it is but for new homes: what is not known stays `null`, the comment above a
+    section stays directly above it, and the one beside the homes says that it speaks of others."""
     text = new_file.text(new_file.example(n))
     (tmp_path / "a.yaml").write_text(text)
     home = Change(("actuation", "home_rotation_deg", 0), "deg", -1.5)
     ledger.write(robot_file.load(tmp_path / "a.yaml"), tmp_path / "b.yaml", [home], Entry("x"))
     new = re.sub(r"  recorded_home_.*\n", "", (tmp_path / "b.yaml").read_text().partition("history:")[0])
     expected = text.replace("home_rotation_deg: [0", "home_rotation_deg: [-1.5")
+    expected = expected.replace("alpha at home\n", f"alpha at home {robot_file.EARLIER}\n")
     assert [line.split() for line in new.splitlines()] == [line.split() for line in expected.splitlines()]
+
+
+COMMENTED = """\
+name: mine
+gravity: null
+tubes:  # the innermost first
+  - length_mm: 420  # by caliper
+    curved_length_mm: 60
+    curvature_per_m: 12  # data sheet
+    inner_diameter_mm: 0.65
+    outer_diameter_mm: 0.88
+    youngs_modulus_GPa: 60
+    poisson_ratio: 0.3
+    density_kg_m3: 6450
+tracker:
+  sensor_on_tube: 1
+  rate_Hz: null
+  jitter_mm: 0.1
+  jitter_deg: null
+  accuracy_95_mm: null
+  accuracy_95_deg: null
+  position_mm: [0, 0, 0]  # unknown
+  # Mounted upside down.
+  rotation_vector_rad:  # of the maker
+    - 0  # x
+    - 0  # y
+  # below
+    - 0  # z
+  sensor_position_mm: [0, 0, 3]  # by ruler
+"""
+
+
+def test_comments_of_earlier_values(tmp_path):
+    """A comment beside a value that changes says, once, that it was written for another; all others stay."""
+    path = tmp_path / "b.yaml"
+    path.write_text(COMMENTED)
+    robot = robot_file.load(path)
+    for step in (1, 2):
+        values = {("tubes", 0, "curvature_per_m"): 12, ("tubes", 0, "length_mm"): 420 + step}
+        values |= {("tracker", "position_mm", 1): step, ("tracker", "rotation_vector_rad", 1): 0.1 * step}
+        changes = [Change(field, "", value) for field, value in values.items()]
+        robot = ledger.write(robot, path, changes, Entry("x"), in_place=True)
+    unknown = Change(("tracker", "sensor_position_mm"), "mm", None)
+    robot = ledger.write(robot, path, [unknown], Entry("x"), in_place=True)
+    robot.tubes[0].curvature_per_m = 13
+    for file, others in ((path, ["by ruler"]), (tmp_path / "c.yaml", ["by ruler", "data sheet"])):
+        robot_file.save(robot, tmp_path / "c.yaml")
+        expected = COMMENTED
+        for comment in ("by caliper", "unknown", "y", *others):
+            expected = expected.replace(f"# {comment}\n", f"# {comment} {robot_file.EARLIER}\n")
+        assert re.findall("#.*", file.read_text()) == re.findall("#.*", expected)
+
+
+def test_comments_of_effects(tmp_path):
+    """An effect that is added leaves what is written beside and below the others."""
+    effects = "effects:\n  friction: {coefficient: [0.02]}  # guess\n# the end\n"
+    (tmp_path / "a.yaml").write_text(COMMENTED + effects)
+    robot = robot_file.load(tmp_path / "a.yaml")
+    added = robot.effects | {"tip_load": {"mass": 0.1}}
+    ledger.write(robot, tmp_path / "b.yaml", [], Entry("x"), effects=added)
+    assert f"{effects}  tip_load: {{mass: 0.1}}\n" in (tmp_path / "b.yaml").read_text()
 
 
 def test_entry(robot, tmp_path):

@@ -94,7 +94,7 @@ def changed(
     if effects is not None:
         _set_effects(document, effects)
     document.setdefault("history", CommentedSeq()).append(_ledger_entry(entry, rows))
-    text = robot_file.dumped(yaml, document)
+    text = robot_file.dumped(yaml, document, robot._source)
     try:
         return robot_file.parse(text.encode(), file)
     except InputError as error:
@@ -155,7 +155,7 @@ def _set_effects(document: CommentedMap, effects: Mapping[str, Mapping[str, Any]
         return
     section = _tidy(effects)
     if "effects" in document or "history" not in document:
-        document["effects"] = section
+        document["effects"] = robot_file.updated(document.get("effects"), section)
     else:
         document.insert(list(document).index("history"), "effects", section)
 

@@ -1,7 +1,8 @@
 """Reads and writes robot.yaml.
 
 `load` reports every error of a file at once, `warnings` values that are possible but look wrong. `save` keeps the
-comments and the layout of the file that the robot came from.
+comments and the layout of the file that the robot came from; a comment beside a value that has changed says that
+it was written for an earlier one.
 """
 
 import io
@@ -13,9 +14,10 @@ from typing import Any
 
 from pydantic import ValidationError
 from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.comments import CommentedBase, CommentedMap
 from ruamel.yaml.nodes import ScalarNode
 from ruamel.yaml.representer import RoundTripRepresenter
+from ruamel.yaml.tokens import CommentToken
 from ruamel.yaml.util import load_yaml_guess_indent
 
 from ctcr import _core, settings
@@ -26,6 +28,7 @@ from ctcr.robot.yaml_document import YamlDocument
 from ctcr.show.output import atomic_writer
 
 LINE_WIDTH = 1000  # a row of the ledger stays one line
+EARLIER = "(written for an earlier value)"  # behind a comment beside a value that has changed since
 
 NO_PYTHON = (
     "effects written in Python cannot act here, where compiled code runs: write it in C++ (docs/effects.md), or take it"
@@ -89,7 +92,7 @@ def save(robot: Robot, path: str | Path) -> None:
     """Writes a robot; where it was loaded from a file, only the values that changed differ from that file."""
     yaml, document = layout(robot)
     with atomic_writer(path) as file:
-        file.write(dumped(yaml, document))
+        file.write(dumped(yaml, document, robot._source))
 
 
 def layout(robot: Robot) -> tuple[YAML, CommentedMap]:
@@ -104,14 +107,30 @@ def layout(robot: Robot) -> tuple[YAML, CommentedMap]:
     _, indent, offset = load_yaml_guess_indent(robot._source.text)
     if indent is not None:
         yaml.indent(mapping=2, sequence=indent, offset=offset or 0)
-    return yaml, _updated(yaml.load(robot._source.text), values)
+    return yaml, updated(yaml.load(robot._source.text), values)
 
 
-def dumped(yaml: YAML, document: Any) -> str:
-    """The text of a document."""
+def dumped(yaml: YAML, document: Any, before: YamlDocument | None = None) -> str:
+    """The text of a document; comments beside values that were others `before` say that they were written for those."""
+    if before:
+        _mark_comments(document, before.data)
     text = io.StringIO()
     yaml.dump(document, text)
     return text.getvalue()
+
+
+def _mark_comments(new: Any, old: Any) -> None:
+    for key in new if isinstance(new, dict) else range(min(len(new), len(old))):
+        value = new[key]
+        if isinstance(new, dict) and key not in old or value == old[key]:
+            continue
+        if isinstance(value, CommentedBase) and not value.fa.flow_style() and isinstance(old[key], dict | list):
+            _mark_comments(value, old[key])  # in lines of their own
+            continue
+        for token in new.ca.items.get(key, ()):
+            if isinstance(token, CommentToken) and token.value.startswith("#") and EARLIER not in token.value:
+                beside, end, below = token.value.partition("\n")
+                token.value = f"{beside} {EARLIER}{end}{below}"
 
 
 def _filled(data: dict[str, Any]) -> dict[str, Any]:
@@ -158,19 +177,19 @@ def _unknown_effects(data: dict[str, Any], compiled: bool) -> list[checks.Fault]
     return [(("effects", name), text(str(name))) for name in effects if name not in known]
 
 
-def _updated(old: Any, new: Any) -> Any:
+def updated(old: Any, new: Any) -> Any:
     """`old`, a parsed document with its layout, with the values of `new`."""
     if isinstance(old, dict) and isinstance(new, dict):
         for key in [key for key in old if key not in new]:
             del old[key]
         for key, value in new.items():
             if key in old:
-                old[key] = _updated(old[key], value)
+                old[key] = updated(old[key], value)
             else:  # a section may be changed there, with comments, as the others
-                old[key] = CommentedMap(value) if isinstance(value, dict) else value
+                old[key] = CommentedMap(value) if type(value) is dict else value
         return old
     if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
         for i, value in enumerate(new):
-            old[i] = _updated(old[i], value)
+            old[i] = updated(old[i], value)
         return old
     return old if old == new else new
