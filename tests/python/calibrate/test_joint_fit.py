@@ -338,7 +338,7 @@ def test_outliers(robot, readings):
         (["tubes.1.youngs_modulos"], "no parameter is named .*youngs_modulos: did you mean tubes.1.youngs_modulus"),
         (["tracker.frme"], "did you mean tracker.frame"),
         (["tubes.4.length"], "no parameter is named tubes.4.length"),
-        (["tubes.1.poisson_ratio"], "tubes.1.poisson_ratio: the robot file does not state its uncertainty"),
+        (["tubes.1.poisson_ratio"], "tubes.1.poisson_ratio: the robot file does not state the uncertainty"),
     ],
 )
 def test_bad_names(robot, readings, free, message):
@@ -350,7 +350,7 @@ def test_bad_names(robot, readings, free, message):
 def test_zero_width(readings):
     """A prior of zero width is refused."""
     text = re.sub(r"rotation_offset_deg: .*", "rotation_offset_deg: 0.0", ROBOT.read_text())
-    with pytest.raises(InputError, match="home_rotation.1: its prior standard deviation is 0, but must be above 0"):
+    with pytest.raises(InputError, match=r"home_rotation.\*: the prior standard deviation must be above 0"):
         outcome(robot_file.parse(text.encode()), readings)
 
 

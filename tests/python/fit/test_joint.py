@@ -14,6 +14,7 @@ from ctcr.model import parameters
 from ctcr.model.model import Model
 from ctcr.model.noise import Noise, changed, noise_of
 from ctcr.model.protocol import LinearModel
+from ctcr.robot.defaults import UNCERTAINTY
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
@@ -136,10 +137,23 @@ def test_priors():
     np.testing.assert_allclose(sd, [0.15 * 58e9, 0.5, np.deg2rad(1), np.deg2rad(0.3)])
     assert parameters.priors(robot(), names, {"tubes.*.curvature": 2.0})[1][1] == 2.0
     assert parameters.priors(robot(), names, {"tubes.1.curvature": inf})[1][1] == inf
-    with pytest.raises(InputError, match=r"poisson_ratio: .* does not state its uncertainty"):
+    with pytest.raises(InputError, match=r"poisson_ratio: .* does not state the uncertainty"):
         parameters.priors(robot(), ["tubes.1.poisson_ratio"])
-    with pytest.raises(InputError, match=r"length: .* is 0, but must be above 0"):
+    with pytest.raises(InputError, match=r"^tubes.1.length: the prior standard deviation must be above 0"):
         parameters.priors(robot(length_mm=0.0), ["tubes.1.length"])
+
+
+def test_priors_of_nothing():
+    """What no fit can move is one problem, which names all parameters: a kind by its pattern, others one by one."""
+    names = ["tubes.1.length", "tubes.1.curvature", "tubes.2.length", "tubes.2.curvature", "tubes.1.poisson_ratio"]
+    with pytest.raises(InputError) as caught:
+        parameters.priors(robot(length_mm=0.0, curvature_percent=[5.0, 0.0]), names)
+    unstated, exact = caught.value.lines
+    assert unstated.startswith("tubes.1.poisson_ratio: the robot file does not state")
+    assert exact.startswith("tubes.*.length, tubes.2.curvature: the prior standard deviation must be above 0")
+    with pytest.raises(InputError) as caught:
+        parameters.priors(robot(**dict.fromkeys(UNCERTAINTY, 0.0)), parameters.expand("standard", robot()))
+    assert len(caught.value.problems) == 1
 
 
 def test_values_round_trip():

@@ -5,6 +5,7 @@ the tracker frame and of the sensor from those of the file, about the axes of th
 vectors.
 """
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -168,19 +169,26 @@ def priors(
     known |= {name: _prior(robot, name) for name in names if name not in known}
     mean, stated, low, high = ([known[name][k] for name in names] for k in range(4))
     width = [given.get(name, sd) for name, sd in zip(names, stated, strict=True)]
-    problems = [
-        Problem(
-            f"{name}: its prior standard deviation is {value:g}, but must be above 0; leave a parameter that is known "
-            "exactly out of the fit"
-            if value is not None
-            else f"{name}: the robot file does not state its uncertainty; give a standard deviation, or infinity"
-        )
-        for name, value in zip(names, width, strict=True)
-        if value is None or not value > 0
-    ]
+    without = [name for name, value in zip(names, width, strict=True) if value is None]
+    exact = [name for name, value in zip(names, width, strict=True) if value is not None and not value > 0]
+    unstated = "the robot file does not state the uncertainty; give a standard deviation, or infinity"
+    narrow = "the prior standard deviation must be above 0: state one, or leave out of the fit what is known exactly"
+    said = ((without, unstated), (exact, narrow))
+    problems = [Problem(f"{', '.join(_short(of, names))}: {text}") for of, text in said if of]
     if problems:
         raise InputError(problems)
     return tuple(np.array(column, float) for column in (mean, width, low, high))
+
+
+def _short(some: Iterable[str], names: Iterable[str]) -> list[str]:
+    """Some of the names: a pattern for those of a kind where all are among them."""
+    kinds: dict[str, list[str]] = {}
+    for name in names:
+        kinds.setdefault(re.sub(r"\.(\d+|[xyz])(?=\.|$)", ".*", name), []).append(name)
+    found, chosen = [], set(some)
+    for pattern, of_kind in kinds.items():
+        found += [pattern] if len(of_kind) > 1 and chosen.issuperset(of_kind) else filter(chosen.__contains__, of_kind)
+    return found
 
 
 def correlations(robot: Robot, names: Sequence[str]) -> Array | None:
