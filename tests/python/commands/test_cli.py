@@ -133,6 +133,15 @@ def test_shape(run, tmp_path):
     assert picture.startswith(b"\x89PNG") and len(picture) > 20_000
 
 
+@pytest.mark.parametrize(
+    "name, begins", [("a.svg", b"<?xml"), ("a.pdf", b"%PDF"), ("a.PNG", b"\x89PNG"), ("a", b"\x89PNG")]
+)
+def test_formats_of_pictures(run, tmp_path, name, begins):
+    """The ending of a picture's name says its format."""
+    code, _, err = run("shape", ROBOT, *JOINTS, "-o", tmp_path / name)
+    assert code == 0 and (tmp_path / name).read_bytes().startswith(begins), err
+
+
 def test_bench(run, monkeypatch):
     from ctcr.commands import bench
 
@@ -233,6 +242,9 @@ def test_errors(run, arguments, message):
         (["calibrate", "fit", ROBOT, TABLE, "--free", "nonsense"], "no parameter is named nonsense"),
         (["calibrate", "fit", ROBOT, TABLE, "--hold-out", "1000"], "--hold-out 1000 needs more than 1000 runs"),
         (["next", ROBOT, TABLE, "--masses", "a"], "--masses a"),
+        (["shape", ROBOT, *JOINTS, "-o", "s.txt"], "s.txt: this option writes .png or .svg or .pdf, not .txt"),
+        (["compare", ROBOT, TABLE, "--report", "s.pdf"], "s.pdf: this option writes .html, not .pdf"),
+        (["export", ROBOT, "--cpp", "s.py"], "s.py: this option writes .hpp or .h, not .py"),
         (["shape", ROBOT, "--beta-mm", "-300,-200,5", "--alpha-deg", "0,0,0"], "5 mm is in front of the plate"),
     ],
 )

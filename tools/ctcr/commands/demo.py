@@ -7,7 +7,7 @@ from ctcr.commands import options
 
 def _folder(what: str, default: str):
     text = f"{what}; that of an earlier demonstration is removed."
-    return options.output("FOLDER", text, kind=None, default=default, show_default=True)
+    return options.output_folder(text, default=default, show_default=True)
 
 
 @click.group(name="demo", invoke_without_command=True)

@@ -7,7 +7,7 @@ from ctcr.commands import options
 
 @click.command(name="export")
 @click.argument("source", type=options.read)
-@options.writes("--cpp", "FILE.hpp", "Write the robot of SOURCE as a C++ header.")
+@options.writes("--cpp", "FILE.hpp|.h", "Write the robot of SOURCE as a C++ header.")
 @options.bench("With --cpp: the bench whose limits it holds.", required=False)
 @options.setting("--namespace", str, "robot", "With --cpp: the namespace of what the header declares.")
 @options.output("FILE.mcap", "Write the recording of SOURCE as MCAP.")

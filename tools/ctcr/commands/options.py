@@ -4,6 +4,7 @@ Each option exists once, as a decorator. Heavy imports are late: `ctcr --help` l
 """
 
 import os
+import re
 from collections.abc import Iterable
 from functools import cached_property, wraps
 from importlib import import_module
@@ -19,14 +20,20 @@ def setting(name: str, kind, default, text: str, **more):
 
 
 class File(click.ParamType):
-    """A file that a command reads or writes. What one option writes, no other reads or writes."""
+    """A file that a command reads or writes. What one option writes, no other reads or writes.
+
+    formats    endings that the name of a written file may have, if it has one
+    """
 
     name = "file"
 
-    def __init__(self, written: bool):
-        self.written = written
+    def __init__(self, written: bool, *formats: str):
+        self.written, self.formats = written, formats
 
     def convert(self, value, param, ctx):
+        ending = os.path.splitext(value)[1].lower()
+        if self.formats and ending and ending not in self.formats:
+            self.fail(f"{value}: this option writes {' or '.join(self.formats)}, not {ending}.", param, ctx)
         if ctx and value != "-" and (os.path.isfile(value) or not os.path.exists(value)):  # not /dev/null
             same = (os.stat(value).st_dev, os.stat(value).st_ino) if os.path.exists(value) else os.path.realpath(value)
             first, written = ctx.meta.setdefault("ctcr.files", {}).setdefault(same, (param, self.written))
@@ -81,13 +88,19 @@ def reads(name: str, metavar: str, text: str, *field: str):
 
 
 def writes(name: str, metavar: str, text: str, *field: str, **more):
-    """An option that names a file to write."""
-    return click.option(name, *field, type=written, metavar=metavar, help=text, **more)
+    """An option that names a file to write; a metavar such as FILE.png|.svg says in which formats alone."""
+    kind = File(True, *re.findall(r"\.\w+", metavar))
+    return click.option(name, *field, type=kind, metavar=metavar, help=text, **more)
 
 
-def output(metavar: str, text: str, required: bool = False, kind: click.ParamType | None = written, **more):
-    """-o, as `target`: the file or, without a `kind`, the folder to write."""
-    return click.option("-o", "--output", "target", type=kind, required=required, metavar=metavar, help=text, **more)
+def output(metavar: str, text: str, **more):
+    """-o, as `target`: the file to write."""
+    return writes("-o", metavar, text, "--output", "target", **more)
+
+
+def output_folder(text: str, **more):
+    """The same for a folder."""
+    return click.option("-o", "--output", "target", metavar="FOLDER", help=text, **more)
 
 
 def repeated(name: str, field: str, metavar: str, text: str, **more):

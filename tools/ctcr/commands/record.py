@@ -8,7 +8,7 @@ from ctcr.commands import options
 @click.command(name="record")
 @options.robot
 @click.argument("plan", type=options.read)
-@options.output("FOLDER", "The recording; one that is there is resumed.", required=True, kind=None)
+@options.output_folder("The recording; one that is there is resumed.", required=True)
 @options.bench("The devices and their limits.")
 @options.setting("--dwell", options.Finite(0), 0.5, "Rest before the first reading [s].")
 @options.setting("--readings", click.IntRange(1), 1, "Readings per row of the plan.")

@@ -13,7 +13,7 @@ SAMPLES = 400  # along the backbone: a chord then misses the curve by micrometre
 @options.joints(required=True)
 @click.option("--force", type=options.Numbers(), default="0,0,0", help="Force at the tip [N], base frame.")
 @click.option("--all", "every", is_flag=True, help="List all stable equilibria: the robot may rest in several.")
-@click.option("-o", "--output", "picture", type=options.written, metavar="FILE.png", help="Draw the robot.")
+@options.writes("-o", "FILE.png|.svg|.pdf", "Draw the robot.", "--output", "picture")
 @options.steps
 @options.json
 def command(robot, beta_mm, alpha_deg, force, every, picture, steps, out) -> None:

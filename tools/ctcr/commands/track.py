@@ -11,7 +11,7 @@ from ctcr.commands import options
 @options.reads("--plant", "ROBOT2", "The robot that is controlled, where it differs from ROBOT.")
 @click.option("--live", is_flag=True, help="Track on the bench instead of on a simulated robot; needs --bench and -o.")
 @options.bench("The devices and their limits.", required=False)
-@options.output("FOLDER", "The recording; one that is there is resumed.", kind=None)
+@options.output_folder("The recording; one that is there is resumed.")
 @options.setting("--patience", options.Finite(0.1), 2.0, "How long the tracker may lose the sensor [s].")
 @options.setting("--most-error-mm", options.Finite(1), 20.0, "Stop where the tip is farther from its reference [mm].")
 @options.folder_name

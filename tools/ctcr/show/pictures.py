@@ -33,7 +33,7 @@ def draw_robot(
     title: str = "",
     others: Sequence[Array] = (),
 ) -> None:
-    """Writes a PNG.
+    """Writes a picture in the format of the ending of `path`: .png (or none), .svg or .pdf.
 
     The backbone in the base frame: `arc_length` (P,) from the front plate [m], `position` (P, 3) [m], `rotation`
     (P, 3, 3), z along the tangent. `tube_ends` (N,): arc length of the tips [m], innermost first. `force` (3,) at the
@@ -61,7 +61,7 @@ def draw_robot(
     _explain(figure, robot, 1e3 * tube_ends, title)
     FigureCanvasAgg(figure)
     with atomic_writer(path, binary=True) as file:
-        figure.savefig(file, format="png")
+        figure.savefig(file, format=Path(path).suffix[1:] or "png")
 
 
 def _stage(axes, centre: Array, margin: float) -> Array:
