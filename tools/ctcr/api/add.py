@@ -3,16 +3,18 @@
 from collections.abc import Mapping, Sequence
 
 from ctcr.api.reviewed import to_fit
+from ctcr.arguments import checked
 from ctcr.diagnose import add as effects_added
 from ctcr.diagnose.add import Added
 from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.effects import catalogue
-from ctcr.effects.settings import found
+from ctcr.effects.settings import found, settings
 from ctcr.errors import InputError, Problem
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements, check_of
 
 
+@checked
 def add(
     robot: Robot,
     effects: Diagnosis | str | Sequence[str],
@@ -27,7 +29,7 @@ def add(
     """Fits effects together with the calibration; the robot with them is `.robot`.
 
     effects          what a diagnosis found, or ids, such as "friction"
-    fixed            parameters that keep a value, by full name in SI: {"effects.friction.coefficient.1": 0.02}
+    fixed            parameters that keep a value, SI, by name as of `ctcr add --set`: {"friction.coefficient.1": 0.02}
     start            parameters that begin at a value, likewise
     free             other parameters that are fitted too; "standard": the paper's
     frame_per_run    whether each run has a tracker frame of its own; None: where the readings say so
@@ -36,16 +38,21 @@ def add(
     """
     check_of(robot, table)
     held: Mapping[str, float] = {}
+    values: Mapping[str, float] = {}
     if isinstance(effects, Diagnosis):
         ids, held, values = found(effects.as_dict(), robot)
-        start = values | dict(start or {})
     else:
         names = [effects] if isinstance(effects, str) else effects
         ids = list(dict.fromkeys(catalogue.get(name, robot.n_tubes).id for name in names))
     if not ids:
         raise InputError(Problem("nothing was found to add" if isinstance(effects, Diagnosis) else "name an effect"))
+    fixed, start = ({**of, **_named(given or {}, robot, ids)} for of, given in ((held, fixed), (values, start)))
     readings, said, _ = to_fit(robot, table, anyway=anyway, frame_per_run=frame_per_run)
-    fixed = {**held, **(fixed or {})}
     added = effects_added.add(robot, readings, ids, fixed=fixed, start=start, free=free)
     added.notices[:0] = said
     return added
+
+
+def _named(values: Mapping[str, float], robot: Robot, ids: Sequence[str]) -> dict[str, float]:
+    """Values by full name."""
+    return settings((f"{name}={float(value)}" for name, value in values.items()), robot, ids)

@@ -4,12 +4,14 @@ from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from ctcr.api.reviewed import to_fit
+from ctcr.arguments import checked
 from ctcr.calibrate import joint_fit
 from ctcr.calibrate.joint_fit import Calibration
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 
+@checked
 def calibrate(
     robot: Robot,
     table: Measurements,
@@ -33,8 +35,6 @@ def calibrate(
     anyway           whether to go on where a convention is wrong
     Raises InputError, and WrongConventions unless `anyway`.
     """
-    if noise not in ("auto", "jitter", "field"):
-        raise ValueError(f"noise must be auto, jitter or field, not {noise!r}")
     readings, said, _ = to_fit(robot, table, anyway=anyway, frame_per_run=frame_per_run)
     found = joint_fit.calibrate(robot, readings, free, hold_out=hold_out, halves=halves, noise=noise, sd=sd)
     found.notices[:0] = said

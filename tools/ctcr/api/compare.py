@@ -3,6 +3,7 @@
 import numpy as np
 
 from ctcr.api.reviewed import reviewed, without_false_poses
+from ctcr.arguments import checked
 from ctcr.audit import copies, missing_motion, sensor_pose, snaps
 from ctcr.compare import analysis
 from ctcr.compare.analysis import Comparison
@@ -17,6 +18,7 @@ from ctcr.show.wording import sentence
 from ctcr.table.measurements import Measurements, check_of
 
 
+@checked
 def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
     """Compares predicted poses with measured ones: the size of the error beside the noise, and what it depends on.
 

@@ -3,12 +3,14 @@
 from collections.abc import Callable
 
 from ctcr.api.reviewed import to_fit
+from ctcr.arguments import checked
 from ctcr.diagnose import pipeline
 from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 
+@checked
 def diagnose(
     robot: Robot,
     table: Measurements,

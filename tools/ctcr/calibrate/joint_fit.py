@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ctcr import settings
+from ctcr.arguments import checked
 from ctcr.arrays import Array, Mask
 from ctcr.audit import sensor_pose
 from ctcr.calibrate import checks
@@ -86,6 +87,7 @@ class Calibration(Result):
         """The input files."""
         return [*self.before.files, *self.readings.files]
 
+    @checked
     def save(self, path: str | Path, *, in_place: bool = False) -> Robot:
         """Writes the calibrated robot file with its entry in the ledger, and returns that robot.
 

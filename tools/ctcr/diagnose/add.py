@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ctcr import settings
+from ctcr.arguments import checked
 from ctcr.arrays import Array, Mask
 from ctcr.audit import prepared
 from ctcr.calibrate.joint_fit import Stage, stage_of
@@ -96,6 +97,7 @@ class Added(Shown):
         changes, entry = _change(self)
         return ledger.changed(self.before, changes, entry, effects=self.after.effects)
 
+    @checked
     def save(self, path: str | Path, *, in_place: bool = False) -> Robot:
         """Writes the robot with its effects and an entry of the ledger, and returns that robot.
 

@@ -57,6 +57,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ctcr import inputs
+from ctcr.arguments import checked
 from ctcr.arrays import Array, Integers
 from ctcr.effects import catalogue, watched
 from ctcr.errors import InputError, Problem, shown
@@ -164,6 +165,7 @@ class Effect:
             return getattr(self, hook)(*arguments)
 
 
+@checked
 def load(path: str | Path) -> list[Effect]:
     """The effects of a Python file, which is run; from then on robot files may hold them.
 

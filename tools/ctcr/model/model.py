@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ctcr import _core
+from ctcr.arguments import checked
 from ctcr.arrays import Array, Mask
 from ctcr.effects import catalogue
 from ctcr.errors import ArgumentError, InputError, Problem, shown
@@ -121,6 +122,7 @@ class Model:
     robot has effects that depend on the path, which single configurations do not have: see `table_poses.predict`.
     """
 
+    @checked
     def __init__(self, robot: Robot, *, steps: int = 1, integrator: str = "default"):
         if integrator not in INTEGRATORS:
             raise ValueError(f"integrator must be one of {', '.join(INTEGRATORS)}, not {integrator!r}")

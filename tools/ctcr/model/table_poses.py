@@ -1,10 +1,12 @@
 """The poses that a model predicts for the rows of a table, in their order, on which effects with history depend."""
 
 from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 
 from ctcr import _core
+from ctcr.arguments import checked
 from ctcr.frames import base_to_tracker, tracker_to_base
 from ctcr.model import user_recording
 from ctcr.model.model import Model, Prediction
@@ -16,15 +18,16 @@ CHUNK_ROWS = 1 << 16  # solved at once: a few MB of poses
 PER_ROW = ("position", "quaternion", "status", "stability")
 
 
-def predict(robot: Robot, table: Measurements, *, steps: int = 4, frame: str = "base") -> Prediction:
+@checked
+def predict(
+    robot: Robot, table: Measurements, *, steps: int = 4, frame: Literal["base", "tracker"] = "base"
+) -> Prediction:
     """The poses of all rows, with the effects of the robot.
 
     steps    factor on the integration steps: more are slower and more accurate
     frame    "base", or "tracker": as measured
     Raises InputError where the table is not one of this robot, or only another convention makes it possible.
     """
-    if frame not in ("base", "tracker"):
-        raise ValueError(f"frame must be base or tracker, not {frame!r}")
     parts = [answer for _, answer in predictions(robot, table, steps)]
     columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in PER_ROW}
     if frame == "tracker":

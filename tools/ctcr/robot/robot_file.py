@@ -8,7 +8,6 @@ it was written for an earlier one.
 import io
 from collections.abc import Iterable
 from math import degrees, radians
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from ruamel.yaml.tokens import CommentToken
 from ruamel.yaml.util import load_yaml_guess_indent
 
 from ctcr import _core, settings
+from ctcr.arguments import checked
 from ctcr.errors import InputError, Problem, suggestion
 from ctcr.robot import checks, defaults, yaml_document
 from ctcr.robot.description import Robot
@@ -48,13 +48,12 @@ _Representer.add_representer(type(None), _Representer.represent_none)
 user_effects: dict[str, Any] = {}  # effects of users' files by id, which robot files may hold; see `ctcr.user_effects`
 
 
+@checked
 def load(path: str | Path, *, compiled: bool = False) -> Robot:
     """The robot described by a file. Raises InputError with all faults of the file.
 
     compiled    whether only the compiled library runs it: effects that users wrote in Python are faults
     """
-    if not isinstance(path, str | PathLike):
-        raise InputError(Problem(f"a value of type {type(path).__name__} is no path of a robot file"))
     return _robot(yaml_document.load(path), compiled)
 
 
@@ -88,6 +87,7 @@ def warnings(robot: Robot) -> list[Problem]:
     return checks.problems(list(checks.doubts(robot)), robot._source)
 
 
+@checked
 def save(robot: Robot, path: str | Path) -> None:
     """Writes a robot; where it was loaded from a file, only the values that changed differ from that file."""
     yaml, document = layout(robot)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Union
 import numpy as np
 
 from ctcr import settings
+from ctcr.arguments import checked
 from ctcr.arrays import Array, Integers, Mask
 from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.robot.description import MAX_TUBES, Robot
@@ -77,6 +78,7 @@ class Measurements(Shown):
     def __len__(self) -> int:
         return len(self.run)
 
+    @checked
     def rows(self, chosen: Mask | Integers | slice) -> "Measurements":
         """The readings of some rows."""
         kept = {name: getattr(self, name) for name in self.COLUMNS}
@@ -178,6 +180,7 @@ class Measurements(Shown):
         return np.column_stack([self.joint_space, self.force / settings.LOAD_LEVER])
 
 
+@checked
 def read(source: Source, n_tubes: int | None = None) -> Measurements:
     """Reads a table of measurements, or a plan, from a file or from a DataFrame with the columns of one.
 
@@ -224,11 +227,7 @@ def _read(table: Table, n_tubes: int, plausible: bool = True) -> Measurements:
 
 
 def check_of(robot: Robot, table: Measurements) -> None:
-    """Raises InputError where these are not a robot and a table of one with as many tubes and at least one row."""
-    kinds = (robot, Robot, "robot: ctcr.load(path)"), (table, Measurements, "table: ctcr.read(path or DataFrame)")
-    for value, kind, wanted in kinds:
-        if not isinstance(value, kind):
-            raise InputError(Problem(f"a value of type {type(value).__name__} is no {wanted} gives one"))
+    """Raises InputError where a table is not one of a robot with as many tubes and at least one row."""
     if table.n_tubes != robot.n_tubes:
         text = f"holds the joints of {counted(table.n_tubes, 'tube')}: the robot has {robot.n_tubes}"
         raise InputError(Problem(text, table.source))
