@@ -56,9 +56,10 @@ def cli() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Runs the command line and exits with 0 when it did what was asked.
+    """Runs the command line and exits with 0 when it did what was asked, whatever it found.
 
-    Else standard error says what was wrong: 2 where the command line is wrong, 130 after Ctrl+C, else 1.
+    Else standard error says what was wrong: 2 where the command line is wrong, 130 after Ctrl+C, else 1
+    (docs/which_command.md).
     """
     # Before numpy loads: its matrices are too small for threads, which only wait for each other. The core has its own.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -261,6 +261,7 @@ def test_at_a_bound(robot, readings):
     stopped = [item for item in found.fitted if item.flag == "at a bound"]
     assert stopped and all(item.value == 0.5 for item in stopped)
     assert any(text.startswith("Ended at a bound") and stopped[0].name in text for text in found.doubts)
+    assert found.as_dict()["notices"] == [*found.doubts, *found.notices]
     assert "bound" not in " ".join(found.notices)
 
 

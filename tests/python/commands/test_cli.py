@@ -254,6 +254,24 @@ def test_usage(run, arguments, message):
     assert code == 2 and message in err and out == ""
 
 
+def test_bad_news(run, tmp_path):
+    """What a command finds is an answer, with exit code 0: values that contradict the robot file are in its JSON, first
+    among the notices. A fit that a wrong convention stops gives none."""
+    demo, short, long = TABLE.with_name("robot.yaml"), tmp_path / "short.csv", tmp_path / "long.yaml"
+    with TABLE.open() as rows:
+        short.write_text("".join(row for number, row in enumerate(rows) if not number or number % 20 == 1))
+    long.write_text(demo.read_text().replace("length_mm: 330.5", "length_mm: 340.5"))
+    free = ["--free", "tubes.2.length,tracker.frame", "--hold-out", 0, "--json", "-", "--anyway"]
+    code, out, err = run("calibrate", "fit", long, short, *free)
+    found = json.loads(out)
+    assert code == 0 and "lengths of the tubes, 1 mm, is contradicted" in found["notices"][0], err
+    assert next(p["shift"] for p in found["parameters"] if p["name"] == "tubes.2.length") < -2
+    exchanged = tmp_path / "exchanged.csv"
+    exchanged.write_text(short.read_text().replace("x_m,y_m", "y_m,x_m"))
+    assert run("compare", demo, exchanged)[0] == 0 and run("diagnose", demo, exchanged)[0] == 0
+    assert run("calibrate", "fit", demo, exchanged)[0] == 1
+
+
 @pytest.mark.parametrize("arguments", [["info", str(ROBOT)], ["info", str(ROBOT), "--json", "-"], ["--help"]])
 @pytest.mark.parametrize("to, says", [(">/dev/full", "cannot be written: no space left"), (">&-", "")])
 def test_output_that_takes_nothing(arguments, to, says):

@@ -93,7 +93,8 @@ def notices(robot: Robot, readings: Measurements, fit: Fit, few: Fit) -> list[st
     outliers = outlier_rows(fit, readings)
     if outliers:
         share = len(outliers) / max(int(np.sum(fit.used)), 1)
-        text = f"{_rows(np.array(outliers))} look like outliers ({wording.percent(share)}) and hardly counted"
+        look = "looks like an outlier" if len(outliers) == 1 else "look like outliers"
+        text = f"{_rows(np.array(outliers))} {look} ({wording.percent(share)}) and hardly counted"
         said.append(text + _of_runs(readings, fit.used, np.isin(readings.row, outliers)) + ".")
     return said
 

@@ -158,7 +158,7 @@ class Calibration(Result):
                 "field_mm": 1e3 * fit.noise.position_field,
                 "field_deg": np.degrees(fit.noise.rotation_field),
             },
-            "notices": self.notices,
+            "notices": [*self.doubts, *self.notices],
         }
 
 

@@ -12,7 +12,8 @@ from ctcr.commands import options
 def command(bench_path: str, folder, out) -> int:
     """Show the devices of a bench.
 
-    Which of them answer, their versions and their faults. Nothing moves.
+    Which of them answer, their versions and their faults. Nothing moves. The exit code is 1 where a device has a fault,
+    or where the emergency stop is on.
 
     Example: ctcr devices --bench bench.yaml
     """
