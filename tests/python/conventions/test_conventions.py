@@ -99,6 +99,17 @@ def test_named(name):
         np.testing.assert_allclose(getattr(found.readings, group), getattr(readings, group), atol=tolerance)
 
 
+def test_unit_of_a_joint_at_rest():
+    """What never moves says nothing of its unit: neither at 0, nor elsewhere, where another unit is another home."""
+    robot, readings = bench(12, 3)
+    still = simulation.simulate(robot, scaled(readings, "alpha", [1, 0, 1]), "jitter", 1)
+    (found,) = review(robot, scaled(still, "alpha", 180 / np.pi)).findings
+    assert (found.kind, found.columns) == ("joint_unit", ("alpha1", "alpha3"))
+    at_rest = replace(readings, beta=readings.beta[:1] + 0 * readings.beta)
+    named = {one.columns for one in hypotheses(robot, at_rest) if one.kind == "joint_unit"}
+    assert named == {("beta1", "beta2", "beta3"), ("alpha1", "alpha2", "alpha3"), ("alpha1",), ("alpha2",), ("alpha3",)}
+
+
 @pytest.mark.parametrize("n_tubes", [1, 2, 3, 4])
 def test_right(n_tubes):
     """Nothing is named on tables of robots that differ from their file as real ones do."""

@@ -185,10 +185,14 @@ def offset_by(hypothesis: Hypothesis, size: float, n_tubes: int) -> Hypothesis:
 
 
 def _units(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
+    """Of one joint that moves, as another unit of one at rest is another home, and of all that are not 0 throughout."""
     n = robot.n_tubes
     for kind in ("alpha", "beta"):
+        values = getattr(readings, kind)
+        moving, every = np.flatnonzero(np.ptp(values, axis=0)), tuple(np.flatnonzero(values.any(axis=0)).tolist())
+        sets = dict.fromkeys([*((int(i),) for i in moving), *([every] if len(every) > 1 else [])])
         for unit, factor in OTHER_UNITS[kind]:
-            for tubes in (some for some in _some(n) if len(some) in (1, n)):
+            for tubes in sets:
                 names, scale = joints(kind, tubes), np.ones(n)
                 scale[list(tubes)] = factor
                 verb, given = "are" if len(tubes) > 1 else "is", "m" if kind == "beta" else "rad"
