@@ -115,14 +115,15 @@ SESSION_PRIOR_WIDER = 10.0  # prior sd of the frame and the homes of a run over 
 # Of that sd, which the scatter of the runs about the typical one may have: from less than the file states to a tracker
 # that stood elsewhere in the room.
 SESSION_PARTS = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03)
+SESSION_ALIKE = 0.8  # fraction explained over the best one's, from which other parameters may as well differ by run
 SESSION_ALIGNMENTS = 6  # Gauss-Newton steps that align the runs before the first fit
 SESSION_ROWS = 600  # rows on which runs are compared, spread over all runs
 
 # ---- Folds: runs, or where there are too few of them, blocks of time or regions of joint space
 
-FEWEST_RUNS = 4  # from which runs are kept together: fewer cannot be split into a fitted and a judged part
 FOLDS = 4  # of a cross-validation: three quarters are fitted, one is judged
-TIME_BLOCKS = 12  # into which a single run is divided: three for each fold
+FEWEST_RUNS = FOLDS  # from which runs are kept together: one for each fold
+TIME_BLOCKS = 3 * FOLDS  # into which a single run is divided: three for each fold
 HELD_OUT_ORDER = (2, 3, 1, 0)  # which of every four groups is held out: runs often alternate in direction or load
 MOST_UNDETERMINED = 0.1  # mean square error that the fitted groups may leave in a held-out one, over that of the jitter
 EXCHANGES = 12  # exchanges of held-out groups, at most

@@ -309,18 +309,6 @@ def test_nothing_measured(robot, readings):
         outcome(robot, replace(readings, position=None, quaternion=None))
 
 
-def test_repeated_rows(robot, readings):
-    """Repeated rows count once; rows without a reading may repeat."""
-    twice = some(readings, np.r_[0:120, 30:60])
-    found, once = outcome(robot, twice), outcome(robot, readings)
-    assert "30 rows" in said(found) and "repeat earlier rows exactly" in said(found)
-    unread = np.isin(np.arange(len(twice)), np.r_[30:60, 120:150])[:, None]
-    moved = replace(twice, position=np.where(unread, np.nan, twice.position), quaternion=None)
-    assert "repeat" not in said(outcome(robot, moved))
-    np.testing.assert_allclose(found.fit.values, once.fit.values, atol=1e-9)
-    np.testing.assert_allclose(found.fit.sd, once.fit.sd, rtol=1e-3)
-
-
 def test_outliers(robot, readings):
     """Outliers are named and hardly move the result."""
     rng = np.random.default_rng(5)

@@ -45,21 +45,6 @@ def start(robot: Robot, readings: Measurements) -> float:
     return max(float(np.sqrt(np.nanmean(np.sum(answer.position[answer.solved, :2] ** 2, axis=1)))), 1e-3)
 
 
-def usable_rows(readings: Measurements) -> tuple[Mask, list[str]]:
-    """Rows that are no copies of earlier readings, and what to say about the others."""
-    columns = [readings.t[:, None], readings.run[:, None], readings.beta, readings.alpha, readings.force]
-    columns += [part for part in (readings.position, readings.quaternion) if part is not None]
-    content = np.nan_to_num(np.hstack(columns), nan=1e300)
-    _, first = np.unique(content, axis=0, return_index=True)
-    copies = readings.measured.copy()
-    copies[first] = False
-    if not copies.any():
-        return ~copies, []
-    verb = "repeats" if copies.sum() == 1 else "repeat"
-    text = f"{_rows(readings.row[copies])} {verb} earlier rows exactly, no new measurements, and left out."
-    return ~copies, [text]
-
-
 def of_sensor(robot: Robot, fit: Fit) -> list[str]:
     """Where a fit found the sensor of its robot, in the frame of the tip, in a sentence; none where that was known."""
     sd, said = dict(zip(fit.names, fit.sd, strict=True)), []

@@ -189,11 +189,11 @@ def calibrate(
         text = "the frames of the runs are fitted by themselves: name other parameters in --free too"
         raise InputError(Problem(text))
     lever = checks.start(robot, readings)
-    usable, repeated = checks.usable_rows(readings)
+    everything = np.ones(len(readings), bool)
     frame = [name for name in names if name.startswith("tracker.")]
-    few = folds.part_of(usable, settings.CROSS_VALIDATION_ROWS)
-    many = np.sum(few) < np.sum(usable)
-    table, rows = some_rows(robot, readings, few) if many else (readings, usable)
+    few = folds.part_of(everything, settings.CROSS_VALIDATION_ROWS)
+    many = np.sum(few) < len(readings)
+    table, rows = some_rows(robot, readings, few) if many else (readings, everything)
     split, judged = _held_out_parts(table, lever, hold_out)
     both = folds.parts_of(table, lever, 2) if halves else None
     prior_sd = fields.in_si(sd or {}, robot)
@@ -219,25 +219,24 @@ def calibrate(
         pair = [refitted(fit, both.part == part) for part in range(2)] if both else []
         likely = fit
         if many:
-            fit = fitted(names, readings, usable, noise=fit.noise)
-        stages = [stage_of("nominal", fit.nominal_residual[usable])]
+            fit = fitted(names, readings, everything, noise=fit.noise)
+        stages = [stage_of("nominal", fit.nominal_residual)]
         if frame and len(frame) < len(names):
             alone = fitted(frame, readings, few, noise=fit.noise, starts=1)
-            stages.append(stage_of("frame alone", alone.residual[usable]))
+            stages.append(stage_of("frame alone", alone.residual))
     return Calibration(
         before=given,
         after=placed(fit.apply(robot), readings.sessions),
         readings=readings,
         fit=fit,
         fitted=fields.fitted(fit),
-        stages=[*stages, stage_of("calibrated", fit.residual[usable])],
+        stages=[*stages, stage_of("calibrated", fit.residual)],
         held_out=held_out,
-        floor=Stage("noise floor", fit.expected_mm(usable), fit.expected_deg(usable)),
+        floor=Stage("noise floor", fit.expected_mm(), fit.expected_deg()),
         floors=floor,
         halves=compare_halves(robot, table, *pair, both.kind) if pair else None,
         notices=[
             *map(sentence, notices),
-            *repeated,
             *checks.of_sensor(fit.apply(robot), fit),
             *checks.notices(robot, readings, fit, likely),
         ],

@@ -226,7 +226,7 @@ def _not_shared(explained: Mapping[tuple[str, ...], float]) -> list[str]:
     if not explained:
         return []
     best = max(explained.values())
-    alike = [names for names in explained if explained[names] > settings.IN_REACH * best]
+    alike = [names for names in explained if explained[names] > settings.SESSION_ALIKE * best]
     of_tubes = [names[0].startswith("tubes.") for names in alike]
     asked = " or ".join(["changed"] * any(of_tubes) + ["homed anew"] * (not all(of_tubes)))
     return [
