@@ -43,6 +43,25 @@ def test_labview(truth, log, imported, same):
     assert "decimal commas" in said and "Comment" in said
 
 
+def test_german(truth, log, imported, refused, same):
+    """German names, a row of units with brackets, dashes and a date, row numbers, -9999 where nothing was seen."""
+    names = ["Nr", "Zeitstempel", "Lauf", "Vorschub Innenrohr", "Vorschub Außenrohr", "Drehwinkel Innenrohr"]
+    names += ["Drehwinkel Außenrohr", "Position X", "Position Y", "Position Z", "qx", "qy", "qz", "qw"]
+    units = ["[-]", "[TT.MM.JJJJ]", "[-]", *["[mm]"] * 2, *["[Grad]"] * 2, *["[mm]"] * 3, *["[-]"] * 4]
+    start = datetime(2026, 5, 4, 10, 15, 30)
+    times = [f"{start + timedelta(seconds=t):%d.%m.%Y %H:%M:%S,%f}" for t in truth.t]
+    pose = np.hstack([1e3 * truth.position, truth.rotation.as_quat()])
+    pose[5] = -9999
+    joints = [1e3 * truth.beta, np.rad2deg(truth.alpha)]
+    head, body = text(names, [np.arange(24), times, truth.run + 1, *joints, pose], ";", ",").split("\n", 1)
+    path = log("\r\n".join([head, ";".join(units), *body.split("\n")]), encoding="utf-8-sig")
+    assert "in German it is --unit alpha=deg" in refused(path)
+    table, said = imported(path, "--unit", "alpha=deg")
+    kept = np.delete(np.arange(24), 5)
+    same(table.rows(kept), kept)
+    assert np.isnan(table.positions[5]).all() and len(np.unique(table.run)) == 2 and "Not used: Nr" in said
+
+
 def test_ros(truth, log, imported, same):
     """Nanoseconds since 1970 with all digits, poses of tip and base side by side, the scalar of quaternions last."""
     stamp = 1_790_000_000_123_456_789

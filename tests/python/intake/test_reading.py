@@ -217,7 +217,7 @@ def test_markers_by_any_spelling(truth, log, imported, same):
         ("beta1_counts", "counts is no unit of length", "--unit beta="),
         ("beta1 [deg]", "deg is no unit of length", "--unit beta="),
         ("alpha1_steps", "steps is no unit of angle", "--unit alpha="),
-        ("alpha1 (Grad)", "Grad is no unit of angle", "--unit alpha="),
+        ("alpha1 (Grad)", "Grad is no unit of angle", "--unit alpha=deg"),
         ("t_ticks", "ticks is no unit of time", "--unit t="),
         ("x [px]", "px is no unit of length", "--unit position="),
         ("mass", "has no unit", "--unit force="),
@@ -245,6 +245,34 @@ def test_words_for_missing_as_numbers(truth, log, imported):
         position[5] = word
         table, said = imported(log(text(NAMES, [truth.t, truth.beta, truth.alpha, position])), "--unit", "position=m")
         assert np.flatnonzero(np.isnan(table.position[:, 0])).tolist() == [5] and "1 row (7): the pose" in said
+
+
+def test_numbers_for_missing(truth, log, imported):
+    """--missing takes numbers, too. One number in all coordinates and angles of a pose is one that was not seen."""
+    angles = np.rad2deg(truth.rotation.as_euler("ZYX"))
+    columns = [truth.t, 1e3 * truth.beta, np.rad2deg(truth.alpha), 1e3 * truth.position, angles]
+    names = ["t", "beta1_mm", "beta2_mm", "alpha1_deg", "alpha2_deg", "x_mm", "y_mm", "z_mm", "yaw", "pitch", "roll"]
+    for word, options in ((-9999.0, []), (-1.0, []), (-77.5, ["--missing", "-77.5"])):
+        for column in columns[3:]:
+            column[5] = word
+        columns[4][5, :2] = -12.0 if options else word
+        table, said = imported(log(text(names, columns)), "--euler", "ZYX", *options)
+        assert np.flatnonzero(~table.measured).tolist() == [5] and "1 row (7): the pose" in said
+
+
+def test_order_of_quaternions_is_shown(truth, log, imported, same):
+    """The list of columns says what each of four numbered ones becomes by --quaternion."""
+    names = [*NAMES, "q1", "q2", "q3", "q4"]
+    quaternions = np.roll(truth.quaternion, -1, axis=1)
+    path = log(text(names, [truth.t, truth.beta, truth.alpha, truth.position, quaternions]))
+    table, said = imported(path, "--quaternion", "xyzw")
+    same(table)
+    assert [line.split()[:2] for line in said.splitlines() if re.match(r" +q\d", line)] == [
+        ["q1", "qx"],
+        ["q2", "qy"],
+        ["q3", "qz"],
+        ["q4", "qw"],
+    ]
 
 
 def test_wrapped_angles(truth, log, imported, same):
@@ -500,6 +528,12 @@ def test_json(log, lines, run, tmp_path):
         ("T [degC]", "t", 0, "degC"),
         ("azimuth", "rz", 0, None),
         ("Vorschub 1 [mm]", "beta", 1, "mm"),
+        ("Weg Innenrohr (mm)", "beta", -3, "mm"),
+        ("Drehwinkel Außenrohr [°]", "alpha", -1, "deg"),
+        ("Zeitstempel [TT.MM.JJJJ]", "t", 0, None),
+        ("Uhrzeit [hh:mm:ss]", "t", 0, None),
+        ("Spitze x [mm]", "x", 0, "mm"),
+        ("Gier (°)", "rz", 0, "deg"),
     ],
 )
 def test_names(name, role, tube, unit):

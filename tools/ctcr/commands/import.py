@@ -43,7 +43,7 @@ _list_option = partial(options.repeated, callback=_names)
 @_pair_option(
     "--unit", "units", "ROLE=UNIT", "Unit of alpha1, alpha, beta, position, force, t, euler; 0.01mm: a count."
 )
-@_list_option("--missing", "missing", "WORD", "A further word for a missing value.")
+@_list_option("--missing", "missing", "WORD", "A further word or number for a missing value.")
 @click.option(
     "--translation", metavar="KIND", help="beta (default), from-home or from-flush: travel outwards from there."
 )

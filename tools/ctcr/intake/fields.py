@@ -35,7 +35,8 @@ def numbers(log: Log, column: int, words: Iterable[str], faults: Faults) -> Arra
     """A column as numbers (M,), NaN where a word or number for missing stands. Text goes to `faults` with its row."""
     raw = log.values[column]
     values = np.asarray(raw, dtype=float) if isinstance(raw, np.ndarray) else _floats(log, column, raw, words, faults)
-    return np.where(np.abs(values) < BEYOND, values, np.nan)  # infinities and NaN too
+    absent = [float(word.replace(",", ".")) for word in words if _is_number(word, decimal_comma=True)]
+    return np.where((np.abs(values) < BEYOND) & ~np.isin(values, absent), values, np.nan)  # infinities and NaN too
 
 
 def _floats(log: Log, column: int, raw: list[str], words: Iterable[str], faults: Faults) -> Array:

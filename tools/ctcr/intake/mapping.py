@@ -282,4 +282,6 @@ def _check_units(made: Mapping, choices: Choices, picker: _Picker) -> None:
         quantity, one = GROUPS[group], {"length": "0.0025mm", "angle": "0.09deg", "time": "0.1s", "force": "0.01N"}
         said = f"{text} is no unit of {quantity} that is known" if text else "has no unit"
         todo = f"say what one is, such as --unit {group}={one[quantity] if text else 'g'} ({units.of(quantity)})"
+        if text.lower() == "grad":
+            todo = f"in German it is --unit {group}=deg, in English --unit {group}=gon"
         picker.say(f"{said}: {todo}, or --ignore it", join(columns))

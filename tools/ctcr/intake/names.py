@@ -17,17 +17,19 @@ def _set(words: str) -> set[str]:
     return set(words.split())
 
 
-TIP_WORDS = _set("tip sensor probe ee effector end tool distal")
+TIP_WORDS = _set("tip sensor probe ee effector end tool distal spitze")
 RUN = _set("run runs trial trials path experiment trajectory traj sequence messung versuch lauf bahn")
-_TIME = _set("t time times timestamp timestamps stamp datetime elapsed secs clock zeit")
+_TIME = _set("t time times timestamp timestamps stamp datetime elapsed secs clock zeit zeitstempel uhrzeit")
 _BETA = _set("beta betas b d trans translation translations translational linear lin ins insertion tr ext extension")
-_BETA |= _set("slide rho l s advance displacement disp stroke vorschub")
+_BETA |= _set("slide rho l s advance displacement disp stroke vorschub vortrieb weg verschiebung")
 _ALPHA = _set("alpha alphas a theta thetas rot rotation rotations rotational roll psi phi angle angles ang winkel")
+_ALPHA |= _set("drehwinkel drehung")
 _STRONG = _set("beta betas alpha alphas insertion translation extension")  # without a number: of one tube
 _SHORT = _set("a b d l s")  # joints where the name says nothing else
 _WORDS = {"one": 1, "two": 2, "three": 3, "four": 4}
-_WORDS |= dict.fromkeys(_set("i in inner innermost innen"), INNER) | dict.fromkeys(_set("middle mid mitte"), MIDDLE)
-_WORDS |= dict.fromkeys(_set("o out outer outermost aussen"), OUTER)
+_WORDS |= dict.fromkeys(_set("i in inner innermost innen innenrohr"), INNER)
+_WORDS |= dict.fromkeys(_set("middle mid mitte mittelrohr"), MIDDLE)
+_WORDS |= dict.fromkeys(_set("o out outer outermost aussen außen aussenrohr außenrohr"), OUTER)
 _SEEN = _set("ok valid visible tracked seen state status visibility isvalid validity")
 _COMMANDED = _set("cmd command commanded des desired target goal setpoint set demand demanded sp nominal planned ideal")
 _COMMANDED |= _set("pred predicted prediction model sim simulated simulation calc calculated computed")
@@ -41,15 +43,16 @@ _WEIGHT = _set("weight mass load payload gewicht masse")  # hung at the tip
 _UNSIZED = _set("count counts cnt cnts step steps tick ticks pulse pulses inc increments")
 _UNSIZED |= {"grad"}  # degrees in German, gon in English
 _PARTS = _set("nsec nsecs nanosec nanosecs")  # of the second that another column counts, as ROS writes stamps
-_EULER = {"roll": "rx", "pitch": "ry", "yaw": "rz", "elevation": "ry", "azimuth": "rz"}
+_EULER = {"roll": "rx", "pitch": "ry", "yaw": "rz", "nick": "ry", "gier": "rz", "elevation": "ry", "azimuth": "rz"}
 _MATRIX = _set("r rot m t h tf mat matrix g rotation transform pose")
 _NOISE = _set("field pose pos position positions data log msg joint joints tube tubes motor axis value values tracker")
-_NOISE |= _set("coordinate coord p translation header of vector xyz is tracking mean avg") | _ROTATION
+_NOISE |= _set("coordinate coord p translation header of vector xyz is tracking mean avg rohr rohre achse") | _ROTATION
 _ELSE = _set("vel velocity speed rate acc acceleration current voltage torque temperature temp error err std sd var")
 _ELSE |= _set("variance cov covariance rms residual quality")
 _REMARKS = _set("base reference left right x y z w utc gmt local unix epoch")  # in brackets they are no units
 _REMARKS |= TIP_WORDS.union(_TIME, RUN, _BETA, _ALPHA, _SEEN, _COMMANDED, _MEASURED, _FORCE, _WEIGHT, _NOISE)
 _REMARKS |= {*_WORDS, *_EULER}
+_DATE = re.compile(r"([dtmjyhs]+[./-])+[dtmjyhs]+")  # how a date is written: TT.MM.JJJJ
 _RATE = re.compile(r"([^\W\d_]+)\s*/\s*(?:s|sec|min|h)[\W\d]*$")  # such as mm/s: neither a joint nor a pose
 _AXIS = re.compile(r"[tp]?[xyz]|q[xyzw]|[rfw][xyz]")
 
@@ -156,6 +159,7 @@ def _unit(name: str) -> tuple[Unit | None, str]:
 def _unknown(text: str) -> Unit | None:
     """What stands in brackets, where it is one word that says nothing else."""
     is_word = re.fullmatch(r"[\d.]*\s*[^\W\d_][\w./^]*", text) and not set(_words(text)) & _REMARKS
+    is_word = is_word and not _DATE.fullmatch(text.lower())
     return units.unknown(text) if is_word else None
 
 

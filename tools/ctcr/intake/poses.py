@@ -41,8 +41,8 @@ def from_quaternions(columns: Array, rows: Integers, name: str, faults: Faults) 
 
 def from_euler(angles: Array, sequence: str) -> Array:
     """Quaternions (M, 4) of angles (M, 3) [rad] about x, y, z, in the sequence of scipy: ZYX moving, zyx fixed axes;
-    of rotation vectors where that is "vector"."""
-    known = np.isfinite(angles).all(axis=1)
+    of rotation vectors where that is "vector". One number three times, other than 0, counts as missing."""
+    known = np.isfinite(angles).all(axis=1) & ((angles != angles[:, :1]) | (angles == 0)).any(axis=1)
     made = np.full((len(angles), 4), np.nan)
     if known.any() and sequence == "vector":
         made[known] = np.roll(Rotation.from_rotvec(angles[known]).as_quat(), 1, axis=1)

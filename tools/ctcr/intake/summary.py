@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ctcr.intake.bodies import EULER, GRID, SEQUENCE, TRANSLATION
+from ctcr.intake.bodies import EULER, GRID, QUATERNION, SEQUENCE, TRANSLATION
 from ctcr.intake.choices import Choices, grouped
 from ctcr.intake.columns import Columns
 from ctcr.intake.sensor import MATRIX
@@ -33,12 +33,14 @@ def rows(columns: Columns) -> list[Row]:
         how = "our format" if used.how == "name" and used.name == _OURS.get(role) else _HOW[used.how]
         also = _UNIT_HOW.get(known, "") if known != used.how else ""
         said = f"{how}, unit" if how == _HOW["name"] and known == "values" else f"{how}, {also}".strip(", ")
-        shown.append(Row(used.name, unit.text if unit else "", _becomes(role), said))
+        shown.append(Row(used.name, unit.text if unit else "", _becomes(role, columns.choices.quaternion), said))
     return shown
 
 
-def _becomes(role: str) -> str:
+def _becomes(role: str, quaternion: str | None) -> str:
     plain = role.removeprefix("ref_")
+    if quaternion == "xyzw" and plain in QUATERNION:  # a role is then a place in that order
+        plain = f"q{quaternion[QUATERNION.index(plain)]}"
     if plain in _OTHER:
         name = _OTHER[plain]
     elif plain in EULER or plain in GRID:

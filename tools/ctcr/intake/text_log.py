@@ -33,6 +33,7 @@ _NUMBER = re.compile(r"[-+−]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?|[-+]?(nan|
 _COMMA_NUMBER = re.compile(r"[-+−]?\d*,\d+([eEdD][-+]?\d+)?")
 _POINT_NUMBER = re.compile(r"[-+−]?\d*\.\d+([eEdD][-+]?\d+)?")
 
+_BRACKETED = re.compile(r"\[.*\]|\(.*\)")
 _RUN_LINE = re.compile(r"\W*([^\W\d_]+)[\W_]*(\d+)\W*")  # Run 2, # trial_3
 
 
@@ -185,7 +186,7 @@ def _names(rows: Rows, start: int, count: int) -> list[str]:
         last_empty = all(not fields[-1].strip() for _, fields in rows[start:] if len(fields) == count)
         names = [*names, ""] if last_empty else ["", *names]
     units = [""] * (len(names) - len(units)) + units
-    names = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=False)]
+    names = [f"{name} [{unit}]" if unit.strip("-") else name for name, unit in zip(names, units, strict=False)]
     return names[: max(count, len([n for n in names if n]))]
 
 
@@ -220,8 +221,12 @@ def _counts(fields: list[str]) -> bool:
 
 
 def _are_units(fields: list[str]) -> bool:
-    filled = [field.strip(" []()") for field in fields if field.strip(" []()")]
-    return bool(filled) and sum(named(field) is not None for field in filled) >= len(filled) / 2
+    """Whether most fields are units, or stand in brackets: of what has no unit, or none that is known."""
+    filled = [field.strip() for field in fields if field.strip(" []()")]
+    units = [_BRACKETED.fullmatch(field) or field == "-" or named(field.strip(" []()")) for field in filled]
+    return sum(map(bool, units)) >= max(1, len(filled) / 2) and any(
+        map(named, (field.strip(" []()") for field in filled))
+    )
 
 
 def _irregular(
