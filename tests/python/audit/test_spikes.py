@@ -92,6 +92,16 @@ def test_undecidable(robot, paths):
     assert np.isnan(spikes.leaps(robot, struck(coarse, [2], size=0.004))).all()
 
 
+def test_beyond_reach(robot, paths):
+    """What no tip reaches, such as -9999 for a missing number, is a spike wherever the path turns or a run ends."""
+    table, turns = measured(robot, paths), [STOPS - 1, 2 * STOPS - 2, 2 * STOPS - 1 + 5]
+    for row in turns:
+        position = table.position.copy()
+        position[row, 1] = -9.999
+        leap = spikes.leaps(robot, replace(table, position=position))
+        assert np.flatnonzero(np.isfinite(leap)).tolist() == [row]
+
+
 def test_other_frame(robot, paths):
     """Only steps are compared, so that a wrong tracker frame changes nothing."""
     table = struck(measured(robot, paths), rows := [7, 60, 111])

@@ -22,11 +22,13 @@ def left_out(
     spikes = np.isfinite(leap)
     if not spikes.any():
         return measurements, []
-    count = "1 reading leaps" if spikes.sum() == 1 else f"{spikes.sum()} readings leap"
+    one = spikes.sum() == 1
+    count = "1 reading leaps" if one else f"{spikes.sum()} readings leap"
+    rows = f"{'row' if one else 'rows'} {listed(measurements.row[spikes])}"
     notice = (
-        f"{count} up to {1e3 * np.nanmax(leap):.1f} mm away and back (rows {listed(measurements.row[spikes])}), "
-        f"at least {settings.SPIKE_LEAP:g} times as far as the joints and the load move the tip: spikes of the "
-        "tracker, left out of all fits and errors"
+        f"{count} up to {1e3 * np.nanmax(leap):.1f} mm away and back ({rows}), "
+        f"at least {settings.SPIKE_LEAP:g} times as far as the joints and the load move the tip: "
+        f"{'a spike' if one else 'spikes'} of the tracker, left out of all fits and errors"
     )
     return measurements.without_poses(spikes), [notice]
 
@@ -51,11 +53,11 @@ def leaps(robot: Robot, measurements: Measurements, predicted: Array | None = No
     moved = np.maximum(predicted_step[:-1], predicted_step[1:])  # NaN, where the model has no solution, finds nothing
     onward = np.sum(step[:-1] * step[1:], axis=1) >= 0  # at a turn, a leap may be one step that the model misses
     found = (
-        onward
-        & (run[:-2] == run[2:])
-        & (leaped > settings.SPIKE_LEAP * moved)
-        & (leaped > settings.SPIKE_VISIBLE * np.sqrt(6) * 1e-3 * jitter)
-        & (np.linalg.norm(measured[2:] - measured[:-2], axis=1) < settings.SPIKE_RETURN * leaped)
+        (onward & (run[:-2] == run[2:]) & (leaped > settings.SPIKE_LEAP * moved))
+        | (leaped > settings.SPIKE_LEAP * 2 * robot.tubes[0].length)  # no tip moves across more than it can reach
+    )
+    found &= (leaped > settings.SPIKE_VISIBLE * np.sqrt(6) * 1e-3 * jitter) & (
+        np.linalg.norm(measured[2:] - measured[:-2], axis=1) < settings.SPIKE_RETURN * leaped
     )
     leap[read[1:-1][found]] = leaped[found]
     return leap
