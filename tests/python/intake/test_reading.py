@@ -260,6 +260,16 @@ def test_numbers_for_missing(truth, log, imported):
         assert np.flatnonzero(~table.measured).tolist() == [5] and "1 row (7): the pose" in said
 
 
+def test_number_for_missing_joints(truth, log, imported, refused):
+    """A number that no joint has, in a few rows, may stand for a missing one: the option that drops them is named."""
+    beta = 1e3 * truth.beta
+    beta[7] = -9999
+    path = log(text([*NAMES[:1], "beta1_mm", "beta2_mm", *NAMES[3:]], [truth.t, beta, truth.alpha, truth.position]))
+    error = refused(path)
+    assert "row 9" in error and "--missing -9999" in error and "encoder" not in error
+    assert len(imported(path, "--missing", "-9999")[0]) == 23
+
+
 def test_order_of_quaternions_is_shown(truth, log, imported, same):
     """The list of columns says what each of four numbered ones becomes by --quaternion."""
     names = [*NAMES, "q1", "q2", "q3", "q4"]

@@ -133,7 +133,10 @@ def _check_values(columns: Columns, moving: Columns, moved: Motion, position, qu
 
 def _hint(beta: Array, choices: Choices) -> str:
     """What joints that cannot be are probably."""
-    if (np.abs(beta) > measurements.QUANTITIES["beta"].usual[1]).any():
+    far = (np.abs(beta) > measurements.QUANTITIES["beta"].usual[1]).any(axis=1)
+    if 0 < far.mean() < 0.5:
+        return "if it stands for what is missing, say so as it stands in the log, such as --missing -9999"
+    if far.any():
         return "if these are counts of an encoder, say how long one is, such as --unit beta=0.0025mm"
     if (beta >= 0).all() and choices.translation is None:
         return (
