@@ -43,6 +43,17 @@ def test_layout(tmp_path):
     assert new.startswith(text.replace("length_mm: 330.5", "length_mm: 331.25"))
 
 
+def test_defaults_of_a_new_file(tmp_path):
+    """What is a default is said beside it alone, so that it is not said of what a command changes there."""
+    text = new_file.text(new_file.example(2))
+    assert not any("default" in line for line in text.splitlines() if line.startswith("#"))
+    (tmp_path / "a.yaml").write_text(text)
+    sd = Change(("uncertainty", "length_mm"), "mm", [0.5, 0.6])
+    ledger.write(robot_file.load(tmp_path / "a.yaml"), tmp_path / "b.yaml", [sd], Entry("x"))
+    written = (tmp_path / "b.yaml").read_text()
+    assert re.search(r"length_mm: \[0.5, 0.6\] +# default \(written for an earlier value\)\n", written)
+
+
 @pytest.mark.parametrize("n", range(1, 5))
 def test_new_file_changed(tmp_path, n):
     """A file of `ctcr init` stays as it is but for new homes: what is not known stays `null`, the comment above a

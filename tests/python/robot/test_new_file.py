@@ -64,6 +64,7 @@ def test_questions(tmp_path):
             ["--tube 1: colour is no field", "--tube 2: length"],
         ),
         (["--tube", CURVED + ",curvature_per_m=3"], ["say the same"]),
+        (["--tube", CURVED.replace("0.88", "0,88")], ["'88' is not FIELD=VALUE; decimals have a point"]),
         (["--tube", CURVED.replace("420", "long")], ["long is not a number"]),
         (["--tube", CURVED, "--tube", CURVED], ["too narrow"]),
         (["--example", 2, "--home-mm=-3"], ["needs 2, one a tube"]),

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from math import isinf, isnan
 from typing import Any
 
-from ctcr.errors import ArgumentError, Problem, did_you_mean, suggestion
+from ctcr.errors import ArgumentError, Problem, did_you_mean, shown, suggestion
 from ctcr.robot.defaults import TRACKER, UNCERTAINTY
 from ctcr.show.wording import counted, numbers
 
@@ -87,7 +87,9 @@ def _tube_of(given: str, where: str) -> NewTube:
             value = float(text)
         except ValueError:
             value = float("nan")
-        if name not in known:
+        if "=" not in part:
+            faults.append(f"{shown(part)} is not FIELD=VALUE; decimals have a point, such as 1.52")
+        elif name not in known:
             faults.append(f"{name} is no field of a tube: {suggestion(name, known, ', '.join(known))}")
             meant.add(did_you_mean(name, known))  # one mistake, one fault
         elif isnan(value) or (isinf(value) and name != "radius_mm"):  # an infinite radius is straight
@@ -136,9 +138,9 @@ def text(robot: NewRobot) -> str:
         "# The sensor, and the base frame as the tracker sees it: x_tracker = R x_base + position.\n"
         f"tracker:\n{_section(TRACKER | {'sensor_on_tube': robot.sensor_on_tube}, _TRACKER)}"
         "\n"
-        "# How far the true values may be from those above: one standard deviation. All defaults. The sensor's pose\n"
-        "# counts as exact unless sensor_position_mm and sensor_rotation_deg stand here.\n"
-        f"uncertainty:\n{_section(UNCERTAINTY, {})}"
+        "# How far the true values may be from those above: one standard deviation. The sensor's pose counts as exact\n"
+        "# unless sensor_position_mm and sensor_rotation_deg stand here.\n"
+        f"uncertainty:\n{_section(UNCERTAINTY, dict.fromkeys(UNCERTAINTY, 'default'))}"
     )
 
 
