@@ -11,7 +11,7 @@ DIRECTIONS = {"unknown": None, "-x": 0, "-y": 1, "-z": 2, "+x": 0, "+y": 1, "+z"
 
 
 @click.command(name="init")
-@options.output("ROBOT", "The robot file to write.", required=True)
+@options.output("ROBOT.yaml|.yml", "The robot file to write.", required=True)
 @click.option("--name", help="Name of the robot.")
 @click.option(
     "--tube",

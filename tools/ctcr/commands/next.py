@@ -10,7 +10,7 @@ from ctcr.commands import options
 @options.measurements
 @options.setting("--runs", click.IntRange(1, 100), 4, "Runs to propose.")
 @options.setting("--masses", str, "0,10,20", "Masses that can be hung at the tip [g].", metavar="GRAMS")
-@options.output("PLAN", "Write the runs as a table that the robot can run.")
+@options.output("PLAN.csv", "Write the runs as a table that the robot can run.")
 @options.json
 @options.threads
 @options.anyway

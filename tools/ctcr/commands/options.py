@@ -167,7 +167,7 @@ def folder(function):
 def new_robot(function):
     """-o and --in-place, as `target` and `in_place`: the robot file to write."""
     in_place = click.option("--in-place", is_flag=True, help="Change the robot file itself.")
-    return output("NEW", "Write the changed robot file.")(in_place(function))
+    return output("NEW.yaml|.yml", "Write the changed robot file.")(in_place(function))
 
 
 def _load_effects(context, parameter, files) -> None:

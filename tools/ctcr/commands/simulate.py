@@ -11,7 +11,7 @@ from ctcr.commands import options
 @options.hide
 @options.noise
 @options.seed
-@options.output("MEASUREMENTS", "The table to write.", required=True)
+@options.output("MEASUREMENTS.csv", "The table to write.", required=True)
 def command(robot, plan, hidden, noise, seed, target) -> None:
     """Simulate the measurements of a plan.
 
