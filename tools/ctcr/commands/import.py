@@ -32,7 +32,7 @@ _list_option = partial(options.repeated, callback=_names)
 
 @click.command(name="import")
 @click.argument("log", type=options.read)
-@options.output("TABLE.csv", "The table to write.", required=True)
+@options.output("TABLE.csv|.txt", "The table to write.", required=True)
 @options.robot_option("Robot file: number of tubes, their lengths and homes.")
 @options.reads("--joints", "LOG", "Another log with the joints, where LOG holds poses alone.", "joint_log")
 @options.reads("--mapping", "FILE.yaml", "Answers kept by --save-mapping; options take precedence.")

@@ -8,7 +8,7 @@ from ctcr.commands import options
 @click.command(name="join")
 @options.robot
 @click.argument("tables", nargs=-1, type=options.read, required=True, metavar="MEASUREMENTS...")
-@options.output("TABLE.csv", "The table to write.", required=True)
+@options.output("TABLE.csv|.txt", "The table to write.", required=True)
 def command(robot, tables, target) -> None:
     """Join the tables of one session.
 

@@ -14,7 +14,7 @@ LISTED_ROWS = 20
 @click.command(name="predict")
 @options.robot
 @click.argument("table", type=options.read)
-@options.output("TABLE.csv", "The table to write.", required=True)
+@options.output("TABLE.csv|.txt", "The table to write.", required=True)
 @options.setting(
     "--frame", click.Choice(["tracker", "base"]), "tracker", "Frame of the predicted poses; tracker: as measured ones."
 )
