@@ -96,7 +96,8 @@ class Selection:
             return False
         if round_.accepted and self._accept(round_):
             return True
-        self.last = round_
+        if more == 1 or round_.is_hopeless(more):
+            self.last = round_
         return False
 
     def revise(self, pool: list[Candidate], more: float = 1.0) -> None:
