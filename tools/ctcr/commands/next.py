@@ -18,10 +18,10 @@ from ctcr.commands import options
 def command(robot, measurements, runs, masses, target, threads, anyway, frame_per_run, out) -> None:
     """Propose the runs to measure next.
 
-    They discriminate best between the effects that MEASUREMENTS leave open about ROBOT. Diagnoses first. Each run
-    goes out and back through the same stops under one load, within the range of the joints measured so far; the
-    runs with the largest expected log evidence come first. Says so when nothing is open, and when no run can
-    decide.
+    They discriminate best between the explanations that MEASUREMENTS leave open about ROBOT: other effects, one more
+    or one less, noise alone. Diagnoses first. Each run goes out and back through the same stops under one load,
+    within the range of the joints measured so far; the runs with the largest expected log evidence come first. Says
+    so when nothing is open, and when no run can decide.
 
     Example: ctcr next robot.yaml measurements.csv --runs 4 --masses 0,20 -o plan.csv
     """
@@ -42,7 +42,7 @@ def command(robot, measurements, runs, masses, target, threads, anyway, frame_pe
         simulation.write(proposal.plan, target)
     out.write_json(
         {
-            "rivals": [rival.id for rival in proposal.rivals],
+            "rivals": [str(rival) for rival in proposal.rivals],
             "log_evidence": {"now": proposal.now if proposal.rivals else None, "expected": proposal.gain},
             "decides": proposal.decides,
             "runs": [{"beta_m": r.beta, "alpha_rad": r.alpha, "mass_kg": r.mass} for r in proposal.runs],
@@ -69,20 +69,21 @@ def _masses(text: str) -> tuple[float, ...]:
 
 def _show(out, n_tubes: int, verdict, proposal) -> None:
     from ctcr.effects import catalogue
+    from ctcr.show.wording import most
 
-    if len(proposal.rivals) < 2:
-        settled = verdict.word in ("identified", "nothing_missing")
-        why = "Nothing is open between effects" if settled else "No effects are open that runs could tell apart"
+    if not proposal.rivals:
+        is_open = len(verdict.likeliest) > 1
+        why = "No runs could tell apart what is open" if is_open else "Nothing is open"
         out.say(f"{why}: the verdict on these measurements is {verdict.word.replace('_', ' ')}.")
-        out.say(*([] if settled else verdict.sentences))
+        out.say(*(verdict.sentences if is_open else []))
         return
-    out.say(f"Open: {' or '.join(rival.id for rival in proposal.rivals)}.")
+    out.say(f"Open: {'; or '.join(f'{rival} ({most(rival.probability)})' for rival in proposal.rivals)}.")
     rows = [
         [str(i), f"{1e3 * run.mass:g}", f"{gain:.1f}"]
         for i, (run, gain) in enumerate(zip(proposal.runs, proposal.gain, strict=True), start=1)
     ]
-    title = f"Runs, best first; log evidence between the nearest two now: {proposal.now:.1f}"
+    title = "Runs, best first; log evidence that the true explanation is expected to gain over the nearest other one"
     out.table(title, ["run", "mass at the tip, g", "expected log evidence with it"], rows)
     if not proposal.decides:
         out.say("No run within the measured joints and these loads can decide. Measure instead:")
-        out.say(*(f"  {rival.id}: {catalogue.get(rival.id, n_tubes).measure}" for rival in proposal.rivals))
+        out.say(*(f"  {name}: {catalogue.get(name, n_tubes).measure}" for name in verdict.undecided))

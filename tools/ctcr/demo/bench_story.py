@@ -153,8 +153,8 @@ def _diagnosed(told) -> str:
 
 def _proposed(told) -> str:
     masses = ", ".join(f"{1e3 * run['mass_kg']:g} g" for run in told["runs"])
-    rivals = " and ".join(told["rivals"]).replace("_", " ")
-    return f"{len(told['runs'])} runs tell {rivals} apart (weights at the tip: {masses})"
+    rivals = ", or ".join(told["rivals"]).replace("_", " ")
+    return f"{len(told['runs'])} runs decide whether it is {rivals} (weights at the tip: {masses})"
 
 
 def _tracked(told) -> str:

@@ -115,8 +115,7 @@ def _candidates(d: Diagnosis) -> str:
 
 def _next(d: Diagnosis) -> str:
     """Further measurements that would decide what is open: effects that some of the likely explanations hold."""
-    likely = [one.effects for one in d.verdict.likeliest]
-    ids = [] if d.verdict.names_no_cause else sorted(frozenset.union(*likely) - frozenset.intersection(*likely))
+    ids = [] if d.verdict.names_no_cause else d.verdict.undecided
     advice = [as_html(f": {catalogue.get(i, d.robot.n_tubes).measure}", bold=i) for i in ids]
     advice += map(as_html, d.varying.measure if d.varying else [])
     if not advice:

@@ -45,6 +45,12 @@ class Verdict:
         return [one for one, sum_ in zip(self.explanations, before, strict=True) if sum_ < SHOWN]
 
     @property
+    def undecided(self) -> list[str]:
+        """Ids of the effects that some of the likeliest explanations hold, and others do not."""
+        likely = [one.effects for one in self.likeliest]
+        return sorted(frozenset.union(*likely) - frozenset.intersection(*likely))
+
+    @property
     def names_no_cause(self) -> bool:
         """Whether something is missing, and no effect of the catalogue is said to be it."""
         return self.word in ("stand_in", "not_in_catalogue")

@@ -1,10 +1,14 @@
-"""The runs that best discriminate between rival explanations of the measurements.
+"""The runs that best discriminate between the explanations that a diagnosis left open.
 
-Each rival is a fit: a robot with an effect. A run discriminates where two rivals predict different readings that no
-calibration within its priors can make alike. Runs are added one by one, each the one that raises the smallest expected
-log evidence between any two rivals most (T-optimal design: Atkinson and Fedorov 1975).
+Each of them is a fit of the robot with its effects. It predicts the readings of a run, and how uncertain its parameters
+leave them. Readings that follow one explanation are expected to gain, for it and against another one, the
+Kullback-Leibler divergence of these two predictions in log evidence. Runs are added one by one: each is the one with
+which the true explanation is expected to gain most over its nearest rival, the mean over all explanations by their
+probability. Refs: Lindley 1956, "On a measure of the information provided by an experiment"; T-optimal designs,
+Atkinson and Fedorov 1975.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from itertools import permutations
 from typing import Any
@@ -13,7 +17,11 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Array, Integers, Mask
+from ctcr.diagnose.engine import Engine, values_of
+from ctcr.diagnose.explanations import Explanation
 from ctcr.diagnose.pipeline import Diagnosis
+from ctcr.diagnose.round import CandidateFit, parameters_of
+from ctcr.errors import InputError
 from ctcr.fit import joint
 from ctcr.model import user_recording
 from ctcr.robot.description import Robot
@@ -22,11 +30,18 @@ from ctcr.table.measurements import Measurements
 
 @dataclass(frozen=True)
 class Rival:
-    """An explanation that the measurements leave open."""
+    """An explanation that the measurements leave open, and its fit to them."""
 
-    id: str
+    explanation: Explanation
     fit: joint.Fit
     fixed: dict[str, float]  # values of parameters of effects that are not fitted
+
+    @property
+    def probability(self) -> float:
+        return self.explanation.probability
+
+    def __str__(self) -> str:
+        return self.explanation.text
 
 
 @dataclass(frozen=True)
@@ -40,11 +55,18 @@ class Run:
 
 @dataclass(frozen=True)
 class Proposal:
-    rivals: list[Rival]
-    now: float  # log evidence between the two nearest rivals
+    rivals: list[Rival]  # the most probable first
     runs: list[Run]
-    gain: list[float]  # expected log evidence between those two after each further run
+    gain: list[
+        float
+    ]  # log evidence that the true one is expected to gain over its nearest rival, with each further run
     plan: Measurements | None  # the runs, without poses
+
+    @property
+    def now(self) -> float:
+        """Log evidence between the two most probable rivals."""
+        first, second, *_ = (rival.probability for rival in self.rivals)
+        return float(np.log(first / second))
 
     @property
     def decides(self) -> bool:
@@ -52,64 +74,81 @@ class Proposal:
 
 
 def rivals_of(diagnosis: Diagnosis) -> list[Rival]:
-    """Fits of the first accepted effect that the measurements left undecided, and of its rivals."""
-    shapes = [accepted.best.candidate.shape for accepted in diagnosis.accepted]
-    for k, accepted in enumerate(diagnosis.accepted):
-        round_, held = accepted.round, dict(pair for shape in shapes[:k] + shapes[k + 1 :] for pair in shape)
-        rivals: dict[str, Rival] = {}
-        for one in round_.tried:
-            near = round_.accepted.score - one.score < settings.DECISIVE
-            if one.fit is not None and (one.id in round_.ids or near):
-                rivals.setdefault(one.id, Rival(one.id, one.fit, held | dict(one.candidate.shape)))
-        if len(rivals) > 1:
-            return [*rivals.values()]
-    return []
+    """The likeliest explanations by effects of the catalogue, or by noise alone, each fitted at the noise and weights
+    of the diagnosis; none where one alone is likely, or the likeliest is a cause that nothing predicts."""
+    likeliest, final = diagnosis.verdict.likeliest, diagnosis.final
+    if len(likeliest) < 2 or likeliest[0].outside:
+        return []
+    measurements = diagnosis.measurements
+    engine = Engine(diagnosis.robot, measurements, final.noise, ~diagnosis.held_out, tolerance=settings.COARSE)
+    rivals = []
+    for explanation in likeliest:
+        if explanation.outside or len(rivals) == settings.PLAN_RIVALS:
+            continue
+        fits = _fits_of(diagnosis, explanation.effects)
+        names, fixed = parameters_of(fits)
+        start = {name: value for one in fits for name, value in values_of(one.fit).items()} | values_of(final) | fixed
+        try:
+            fit = engine.fit_like(final, names, start, fixed=fixed)
+        except InputError:  # it has no solution for these readings
+            continue
+        rivals.append(Rival(explanation, fit, fixed))
+    return rivals if len(rivals) > 1 else []
+
+
+def _fits_of(diagnosis: Diagnosis, effects: Collection[str]) -> list[CandidateFit]:
+    """The fit of each effect in the form that the diagnosis accepted, or that gained most in a round."""
+    known = {one.id: one for round_ in diagnosis.rounds for one in reversed(round_.best) if one.fit}
+    known |= {accepted.id: accepted.best for accepted in diagnosis.accepted}
+    return [known[identity] for identity in sorted(effects)]
 
 
 def propose(diagnosis: Diagnosis, runs: int = 4, masses: tuple[float, ...] = (0.0, 0.01, 0.02)) -> Proposal:
     """The next `runs` runs; `masses` [kg] can be hung at the tip. Raises InputError where the model has no solution."""
     rivals = rivals_of(diagnosis)
-    if len(rivals) < 2:
-        return Proposal(rivals, np.inf, [], [], None)
+    if not rivals:
+        return Proposal([], [], [], None)
     robot, measurements = diagnosis.robot, diagnosis.measurements
     offered = np.array(masses if robot.gravity is not None else (0.0,))
     pool = random_runs(robot, measurements, settings.PLAN_POOL, offered, np.random.default_rng(1))
     if not pool:
-        return Proposal(rivals, _margin(rivals), [], [], None)
-    plan = table(robot, pool)
-    contests = [_contest(diagnosis, a, b, plan) for a, b in permutations(rivals, 2)]
-    usable = np.flatnonzero(np.all([contest.solved for contest in contests], axis=0)).tolist()
+        return Proposal(rivals, [], [], None)
+    contests = _contests(diagnosis, rivals, table(robot, pool))
+    usable = np.flatnonzero(np.all([contest.solved for of in contests for contest in of], axis=0)).tolist()
     chosen: list[int] = []
     gain: list[float] = []
+
+    def expected(runs: list[int]) -> float:
+        shares = np.array([rival.probability for rival in rivals])
+        return float(shares @ [min(one.evidence(runs) for one in of) for of in contests] / shares.sum())
+
     while usable and len(chosen) < runs:
-        value = {k: min(contest.evidence([*chosen, k]) for contest in contests) for k in usable}
+        value = {k: expected([*chosen, k]) for k in usable}
         best = max(value, key=lambda k: value[k])
         chosen.append(best)
         usable.remove(best)
-        gain.append(float(value[best]))
+        gain.append(value[best])
     picked = [pool[k] for k in chosen]
     first = int(measurements.run.max()) + 1
-    return Proposal(rivals, _margin(rivals), picked, gain, table(robot, picked, first) if picked else None)
-
-
-def _margin(rivals: list[Rival]) -> float:
-    best, second = sorted((rival.fit.log_evidence for rival in rivals), reverse=True)[:2]
-    return float(best - second)
+    return Proposal(rivals, picked, gain, table(robot, picked, first) if picked else None)
 
 
 class Contest:
     """The evidence of readings that follow one explanation against another one, by run, in normal equations.
 
-    residual (rows,) and jacobian (rows, n) by the other's parameters, in units of the noise; run (rows,) from 0;
-    covariance (n, n) of the other's parameters before these runs.
+    residual (rows,) between the two predictions; own (rows, n) and other (rows, m): derivatives of the predictions by
+    parameters that are independent and of unit variance before these runs; all in units of the noise. run
+    (rows,): from 0
     """
 
-    def __init__(self, residual: Array, jacobian: Array, run: Integers, covariance: Array) -> None:
+    def __init__(self, residual: Array, own: Array, other: Array, run: Integers) -> None:
         parts = [run == k for k in range(int(run.max()) + 1)]
-        self.square = np.array([residual[part] @ residual[part] for part in parts])
-        self.cross = np.array([jacobian[part].T @ residual[part] for part in parts])
-        self.information = np.array([jacobian[part].T @ jacobian[part] for part in parts])
-        self.known = np.linalg.inv(covariance)
+
+        def by_run(a: Array, b: Array) -> Array:
+            return np.array([a[part].T @ b[part] for part in parts])
+
+        self.square, self.cross = by_run(residual, residual), by_run(other, residual)
+        self.own, self.other, self.mixed = by_run(own, own), by_run(other, other), by_run(other, own)
 
     @property
     def solved(self) -> Mask:
@@ -117,32 +156,53 @@ class Contest:
         return np.isfinite(self.square)
 
     def evidence(self, runs: list[int]) -> float:
-        """Expected log evidence for the first explanation after these runs."""
-        cross, information = self.cross[runs].sum(axis=0), self.information[runs].sum(axis=0)
-        explained = cross @ np.linalg.solve(self.known + information, cross)
-        return 0.5 * float(self.square[runs].sum() - explained)
+        """Expected log evidence for the first explanation after these runs: the divergence of normal distributions with
+        the covariances 1 + own own^T and 1 + other other^T."""
+        square, cross, own, other, mixed = (
+            part[runs].sum(axis=0) for part in (self.square, self.cross, self.own, self.other, self.mixed)
+        )
+        known, of_own = np.eye(len(other)) + other, np.eye(len(own)) + own
+        explained = np.linalg.solve(known, np.column_stack([cross, other, mixed]))
+        by_cross, by_other, by_mixed = explained[:, 0], explained[:, 1 : 1 + len(other)], explained[:, 1 + len(other) :]
+        spread = np.trace(own) - np.trace(by_other) - np.sum(mixed * by_mixed)
+        volume = np.linalg.slogdet(known)[1] - np.linalg.slogdet(of_own)[1]
+        return 0.5 * float(square - cross @ by_cross + spread + volume)
 
 
-def _contest(diagnosis: Diagnosis, truth: Rival, other: Rival, plan: Measurements) -> Contest:
-    position, quaternion = _readings(diagnosis, truth, plan)
-    seen = replace(plan, position=position, quaternion=quaternion)
-    recorded = user_recording.recording_of(diagnosis.robot, seen, other.fit.names, fixed=other.fixed)
-    residual, jacobian, _ = recorded.residual(other.fit.values, True)
-    # The field error is the same for both: jitter remains, inflated as in the fit.
-    noise = other.fit.noise
-    sd = np.repeat([noise.position_jitter, noise.rotation_jitter], 3) * np.repeat(other.fit.inflation, 3)
+def _contests(diagnosis: Diagnosis, rivals: list[Rival], plan: Measurements) -> list[list[Contest]]:
+    """Of each rival against each of the others."""
+    # The field error is the same for all: jitter remains, inflated as in the fit.
+    noise, inflation = diagnosis.final.noise, diagnosis.final.inflation
+    sd = np.repeat([noise.position_jitter, noise.rotation_jitter], 3) * np.repeat(inflation, 3)
     if diagnosis.measurements.quaternion is None:
         sd[3:] = np.inf
     weight = np.tile(1 / sd, len(plan))
     run = np.repeat(plan.run - plan.run[0], 6)
-    return Contest(residual * weight, jacobian * weight[:, None], run, other.fit.covariance)
+
+    def recorded(rival: Rival, seen: Measurements) -> Any:
+        return user_recording.recording_of(diagnosis.robot, seen, rival.fit.names, fixed=rival.fixed)
+
+    seen, derivatives = {}, {}
+    for k, rival in enumerate(rivals):
+        of_plan = recorded(rival, plan)
+        of_plan.residual(rival.fit.values)
+        position, quaternion = of_plan.predicted()
+        seen[k] = replace(plan, position=position, quaternion=quaternion)
+        jacobian = recorded(rival, seen[k]).residual(rival.fit.values, True)[1]
+        derivatives[k] = weight[:, None] * jacobian @ _root(rival.fit.covariance)
+
+    def contest(own: int, other: int) -> Contest:
+        residual = recorded(rivals[other], seen[own]).residual(rivals[other].fit.values)[0]
+        return Contest(weight * residual, derivatives[own], derivatives[other], run)
+
+    pairs = list(permutations(range(len(rivals)), 2))
+    return [[contest(*pair) for pair in pairs if pair[0] == k] for k in range(len(rivals))]
 
 
-def _readings(diagnosis: Diagnosis, rival: Rival, plan: Measurements) -> tuple[Array, Array]:
-    """What the tracker would read, (rows, 3) [m] and (rows, 4), NaN where the model has no solution."""
-    recorded: Any = user_recording.recording_of(diagnosis.robot, plan, rival.fit.names, fixed=rival.fixed)
-    recorded.residual(rival.fit.values)
-    return recorded.predicted()
+def _root(covariance: Array) -> Array:
+    """R (n, n) with R R^T the covariance, which may be singular where parameters are known exactly."""
+    values, vectors = np.linalg.eigh(covariance)
+    return vectors * np.sqrt(np.maximum(values, 0.0))
 
 
 # ---- random runs
