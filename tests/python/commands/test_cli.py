@@ -244,7 +244,7 @@ def test_errors(run, arguments, message):
         (["next", ROBOT, TABLE, "--masses", "a"], "--masses a"),
         (["shape", ROBOT, *JOINTS, "-o", "s.txt"], "s.txt: this option writes .png or .svg or .pdf, not .txt"),
         (["compare", ROBOT, TABLE, "--report", "s.pdf"], "s.pdf: this option writes .html, not .pdf"),
-        (["import", TABLE, "-o", "s.xlsx"], "s.xlsx: this option writes .csv, not .xlsx"),
+        (["import", TABLE, "-o", "s.xlsx"], "s.xlsx: this option writes .csv or .txt, not .xlsx"),
         (["calibrate", "fit", ROBOT, TABLE, "-o", "s.csv"], "s.csv: this option writes .yaml or .yml, not .csv"),
         (["export", ROBOT, "--cpp", "s.py"], "s.py: this option writes .hpp or .h, not .py"),
         (["shape", ROBOT, "--beta-mm", "-300,-200,5", "--alpha-deg", "0,0,0"], "5 mm is in front of the plate"),
