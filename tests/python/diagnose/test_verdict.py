@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ctcr import settings
 from ctcr.diagnose import verdict
 from ctcr.diagnose.explanations import probability, weighed
 from ctcr.show.wording import most
@@ -62,6 +63,19 @@ def test_nothing_accepted(tip_load):
     assert judged(tip_load, rounds=rounds, accepted=[], residual=more).word == "not_in_catalogue"
     at_joints = judged(tip_load, rounds=rounds, accepted=[], residual=replace(noise, clusters=[7, 8]))
     assert at_joints.word == "not_in_catalogue" and "rows 7, 8" in " ".join(at_joints.sentences)
+
+
+def test_not_sure(tip_load):
+    """An effect that is likelier than noise, but not sure, is named where noise explains the residual, and the
+    probability of the verdict is that of noise."""
+    (round_,), noise = without(tip_load), replace(tip_load.residual, p_value=0.5, clusters=[])
+    gain = np.log(len({one.id for one in round_.tried}) / settings.REJECTION_MISSED) + 2.0
+    tried = [replace(one, refit=gain) if one.refit is not None else one for one in round_.tried[:1]]
+    found = judged(tip_load, rounds=[replace(round_, tried=[*tried, *round_.tried[1:]])], accepted=[], residual=noise)
+    assert found.word == "nothing_missing" and found.explanations[0].effects
+    assert found.probability == next(one.probability for one in found.explanations if one.text == "noise alone") < 0.5
+    assert found.explanations[0].text in found.sentences[1]
+    assert found.undecided
 
 
 def test_rivals(tip_load):

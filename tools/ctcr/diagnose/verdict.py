@@ -2,7 +2,7 @@
 
 | word | where |
 |---|---|
-| `nothing_missing` | noise alone is the most probable explanation |
+| `nothing_missing` | noise alone is the most probable explanation, or explains the residual and no effect is sure |
 | `not_in_catalogue` | a cause outside the catalogue is, and no effect predicts held-out runs better; or none is sure |
 | `stand_in` | a cause outside the catalogue is; effects imitate it and predict held-out runs better |
 | `ambiguous` | effects are, and the data cannot tell some of them apart |
@@ -63,6 +63,7 @@ def judge(rounds: list[Round], accepted: list[Accepted], residual: Residual, exp
     every = weighed(rounds, accepted, residual, explained.values())
     classes = [a.ids for a in accepted]
     outside = sum(one.probability for one in every if one.outside)
+    noise = sum(one.probability for one in every if not one.effects and not one.outside)
     likeliest = every[0]
     if likeliest.outside and not likeliest.effects:
         names = join([a.id for a in accepted])
@@ -78,10 +79,12 @@ def judge(rounds: list[Round], accepted: list[Accepted], residual: Residual, exp
         if likeliest.effects and residual.structured:
             rival = f"the likeliest explanation, {likeliest.text} ({most(likeliest.probability)}), is not decided"
             sentences = [f"More than noise is left; {rival} by these data.", *residual.about_outliers]
-            noise = next(one.probability for one in every if not one.effects and not one.outside)
             return Verdict("not_in_catalogue", 1 - noise, every, sentences)
-        noise = "Calibration and the tracker's noise explain these measurements."
-        return Verdict("nothing_missing", every[0].probability, every, [noise])
+        sentences = ["Calibration and the tracker's noise explain these measurements."]
+        if likeliest.effects:
+            acts = f"{likeliest.text} ({most(likeliest.probability)}) would explain them better"
+            sentences.append(f"They may hide an effect: {acts}, which is not decided by these data.")
+        return Verdict("nothing_missing", noise, every, sentences)
     present, alone = probability(every, classes), probability(every, classes, outside=False)
     names = join([" or ".join(ids) for ids in classes])
     verb = "explains" if len(accepted) == 1 else "explain"
