@@ -19,7 +19,7 @@ PAGE = (ROOT / "docs" / "json.md").read_text()
 
 
 def documented() -> dict[str, set[str]]:
-    """The keys of each command: `a.{b,c}` are `a.b` and `a.c`."""
+    """The keys of each command: `a.{b, c}` are `a.b` and `a.c`."""
     found = {}
     for section in PAGE.split("\n## ")[1:]:
         title, body = section.split("\n", 1)
@@ -28,7 +28,7 @@ def documented() -> dict[str, set[str]]:
             for key in re.findall(r"`([^`]+)`", cell):
                 head, _, rest = key.partition("{")
                 names, _, tail = rest.partition("}")
-                keys |= {head + name + tail for name in names.split(",")}
+                keys |= {head + name + tail for name in names.split(", ")}
         found[title] = keys
     return found
 
