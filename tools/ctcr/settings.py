@@ -220,7 +220,6 @@ MOST_TEETH = 24  # of a wheel whose errors are tried
 
 # ---- Plan of further runs
 
-PLAN_RIVALS = 4  # explanations between which runs shall decide, at most: others are hardly probable
 PLAN_POOL = 120  # random runs to choose from
 PLAN_TRIES = 100  # random runs that are drawn for each one that the joints allow
 PLAN_STOP_S = 2.0  # [s] from stop to stop

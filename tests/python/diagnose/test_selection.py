@@ -57,7 +57,7 @@ def test_gain_that_does_not_last(robot):
     round_.tried = [round_.accepted]
     assert not chosen._accept(round_)
     assert chosen.fit is before and not chosen.accepted and not chosen.history
-    assert round_.tried[0].refit < settings.DECISIVE and "fitted to the end" in round_.why_not
+    assert round_.tried[0].refit < settings.DECISIVE and "in a converged fit" in round_.why_not
 
 
 @pytest.mark.parametrize("seed", [3, 4])

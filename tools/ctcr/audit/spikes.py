@@ -54,7 +54,7 @@ def leaps(robot: Robot, measurements: Measurements, predicted: Array | None = No
     onward = np.sum(step[:-1] * step[1:], axis=1) >= 0  # at a turn, a leap may be one step that the model misses
     found = (
         (onward & (run[:-2] == run[2:]) & (leaped > settings.SPIKE_LEAP * moved))
-        | (leaped > settings.SPIKE_LEAP * 2 * robot.tubes[0].length)  # no tip moves across more than it can reach
+        | (leaped > settings.SPIKE_LEAP * 2 * robot.tubes[0].length)  # twice its reach: no tip moves farther
     )
     found &= (leaped > settings.SPIKE_VISIBLE * np.sqrt(6) * 1e-3 * jitter) & (
         np.linalg.norm(measured[2:] - measured[:-2], axis=1) < settings.SPIKE_RETURN * leaped

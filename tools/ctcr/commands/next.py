@@ -82,7 +82,7 @@ def _show(out, n_tubes: int, verdict, proposal) -> None:
         [str(i), f"{1e3 * run.mass:g}", f"{gain:.1f}"]
         for i, (run, gain) in enumerate(zip(proposal.runs, proposal.gain, strict=True), start=1)
     ]
-    title = "Runs, best first; log evidence that the true explanation is expected to gain over the nearest other one"
+    title = "Runs, best first; log evidence that the true explanation is expected to gain over its nearest rival"
     out.table(title, ["run", "mass at the tip, g", "expected log evidence with it"], rows)
     if not proposal.decides:
         out.say("No run within the measured joints and these loads can decide. Measure instead:")

@@ -88,7 +88,7 @@ def reads(name: str, metavar: str, text: str, *field: str):
 
 
 def writes(name: str, metavar: str, text: str, *field: str, **more):
-    """An option that names a file to write; a metavar such as FILE.png|.svg says in which formats alone."""
+    """An option that names a file to write; the endings in its metavar, as in FILE.png|.svg, are the only formats."""
     kind = File(True, *re.findall(r"\.\w+", metavar))
     return click.option(name, *field, type=kind, metavar=metavar, help=text, **more)
 

@@ -95,9 +95,9 @@ class Round:
         self.accepted, self.ids, self.reason = None, [], reason
 
     def refute(self, gain: float) -> None:
-        """Accepts nothing after all: fitted to the end, its effect gains only so much log evidence."""
+        """Accepts nothing after all: in a converged fit the effect gains only so much log evidence."""
         self.tried = [replace(one, refit=gain) if one is self.accepted else one for one in self.tried]
-        self.reject(f"{self.accepted.id}, fitted to the end, gains only {gain:.1f} in log evidence")
+        self.reject(f"in a converged fit {self.accepted.id} gains only {gain:.1f} in log evidence")
 
     def release_memory(self) -> None:
         """Drops the readings of its fits: with many rows, a round would need as much memory as everything else."""

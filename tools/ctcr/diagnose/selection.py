@@ -205,8 +205,8 @@ class Selection:
         return True
 
     def _accept(self, round_: Round) -> bool:
-        """Adds the effect of a round in its best form, if the gain that the round saw lasts: fitted to the end, with
-        outliers of its own, the readings must be decisively likelier than before."""
+        """Adds the effect of a round in its best form, if its gain lasts: in a converged fit that finds the outliers
+        anew, the readings must be decisively likelier than before."""
         best, engine, before = round_.accepted, self.engine, self.fit
         assumed = engine.robust, engine.measurements
         engine.robust = True

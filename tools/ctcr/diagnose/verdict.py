@@ -82,8 +82,8 @@ def judge(rounds: list[Round], accepted: list[Accepted], residual: Residual, exp
             return Verdict("not_in_catalogue", 1 - noise, every, sentences)
         sentences = ["Calibration and the tracker's noise explain these measurements."]
         if likeliest.effects:
-            acts = f"{likeliest.text} ({most(likeliest.probability)}) would explain them better"
-            sentences.append(f"They may hide an effect: {acts}, which is not decided by these data.")
+            likelier = f"{likeliest.text} ({most(likeliest.probability)}) is likelier than noise alone"
+            sentences.append(f"Yet {likelier}, which these data do not decide.")
         return Verdict("nothing_missing", noise, every, sentences)
     present, alone = probability(every, classes), probability(every, classes, outside=False)
     names = join([" or ".join(ids) for ids in classes])

@@ -1,16 +1,14 @@
 """The runs that best discriminate between the explanations that a diagnosis left open.
 
-Each of them is a fit of the robot with its effects. It predicts the readings of a run, and how uncertain its parameters
-leave them. Readings that follow one explanation are expected to gain, for it and against another one, the
-Kullback-Leibler divergence of these two predictions in log evidence. Runs are added one by one: each is the one with
-which the true explanation is expected to gain most over its nearest rival, the mean over all explanations by their
-probability. Refs: Lindley 1956, "On a measure of the information provided by an experiment"; T-optimal designs,
-Atkinson and Fedorov 1975.
+Each explanation is a fit of the robot with its effects. It predicts the readings of a run and their uncertainty. If it
+is true, new readings are expected to raise its log evidence over that of another one by the Kullback-Leibler divergence
+of their predictions. Runs are added one by one: the next is that with which the true explanation is expected to gain
+most over its nearest rival, in the mean over all explanations by their probability. Refs: Lindley 1956, "On a measure
+of the information provided by an experiment"; T-optimal designs, Atkinson and Fedorov 1975.
 """
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -57,9 +55,7 @@ class Run:
 class Proposal:
     rivals: list[Rival]  # the most probable first
     runs: list[Run]
-    gain: list[
-        float
-    ]  # log evidence that the true one is expected to gain over its nearest rival, with each further run
+    gain: list[float]  # of the true one over its nearest rival: expected log evidence, with each further run
     plan: Measurements | None  # the runs, without poses
 
     @property
@@ -83,11 +79,11 @@ def rivals_of(diagnosis: Diagnosis) -> list[Rival]:
     engine = Engine(diagnosis.robot, measurements, final.noise, ~diagnosis.held_out, tolerance=settings.COARSE)
     rivals = []
     for explanation in likeliest:
-        if explanation.outside or len(rivals) == settings.PLAN_RIVALS:
+        if explanation.outside:
             continue
         fits = _fits_of(diagnosis, explanation.effects)
         names, fixed = parameters_of(fits)
-        start = {name: value for one in fits for name, value in values_of(one.fit).items()} | values_of(final) | fixed
+        start = fixed | {name: value for one in fits for name, value in values_of(one.fit).items()} | values_of(final)
         try:
             fit = engine.fit_like(final, names, start, fixed=fixed)
         except InputError:  # it has no solution for these readings
@@ -137,8 +133,8 @@ class Contest:
     """The evidence of readings that follow one explanation against another one, by run, in normal equations.
 
     residual (rows,) between the two predictions; own (rows, n) and other (rows, m): derivatives of the predictions by
-    parameters that are independent and of unit variance before these runs; all in units of the noise. run
-    (rows,): from 0
+    parameters that are independent and of unit variance before these runs; all in units of the noise.
+    run (rows,), counted from 0.
     """
 
     def __init__(self, residual: Array, own: Array, other: Array, run: Integers) -> None:
@@ -195,8 +191,8 @@ def _contests(diagnosis: Diagnosis, rivals: list[Rival], plan: Measurements) -> 
         residual = recorded(rivals[other], seen[own]).residual(rivals[other].fit.values)[0]
         return Contest(weight * residual, derivatives[own], derivatives[other], run)
 
-    pairs = list(permutations(range(len(rivals)), 2))
-    return [[contest(*pair) for pair in pairs if pair[0] == k] for k in range(len(rivals))]
+    every = range(len(rivals))
+    return [[contest(own, other) for other in every if other != own] for own in every]
 
 
 def _root(covariance: Array) -> Array:
