@@ -139,7 +139,6 @@ HALVES_DRAWS, HALVES_SEED = 24, 1  # of the posterior: the RMS that noise gives 
 
 DECISIVE = 5.0  # log evidence that decides between two models: odds of 150 to 1
 TIE = 3.0  # log evidence below which candidates cannot be told apart, nor one from none: odds of 20 to 1
-SAME_SIGNAL = 0.95  # fraction of each other's signal that candidates imitate, from which data cannot tell them apart
 MAX_EFFECTS = 6  # more causes than that no session can tell apart
 
 # ---- Diagnosis: course of the selection

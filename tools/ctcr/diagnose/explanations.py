@@ -93,7 +93,7 @@ def weighed(
         refitted = _refitted(a.round)
         own, others = refitted[a.id].score, complete + values - _plausible(a.best)
         for rival in (one for one in refitted.values() if one.id not in found):  # in place of it
-            behind = 0.0 if rival.id in a.ids else max(own - rival.score, 0.0)
+            behind = max(own - rival.score, 0.0)
             tempered = behind / (1 + catalogue.get(a.id).form_error ** 2 * max(own, 0.0))
             weigh(found - {a.id} | {rival.id}, others - tempered + _plausible(rival))
         rest = [b for b in accepted if b is not a]

@@ -4,7 +4,7 @@ import numpy as np
 
 from ctcr.compare.figures import drawable
 from ctcr.diagnose.pipeline import Diagnosis
-from ctcr.diagnose.round import imitated
+from ctcr.diagnose.round import CandidateFit
 from ctcr.fit.result import Fit
 from ctcr.show.palette import ERROR, FAINT, GOOD, INK, NOISE, PALETTE, TINT
 from ctcr.show.wording import short
@@ -104,7 +104,7 @@ def overlap(figure, d: Diagnosis) -> bool | None:
     best = [one for one in d.rounds[0].best if one.fit is not None]
     if len(best) < 2:
         return False
-    fraction = np.array([[imitated(of, by) for by in best] for of in best])
+    fraction = np.array([[_imitated(of, by) for by in best] for of in best])
     axes = figure.subplots()
     axes.grid(False)
     picture = axes.imshow(fraction, vmin=0, vmax=1, cmap="Blues")
@@ -136,3 +136,11 @@ def course(figure, d: Diagnosis) -> None:
             axes.axvspan(start + 0.5, end + 0.5, color=TINT, zorder=0)
     axes.set(xlabel="reading (grey: held out)", ylabel="error, mm", ylim=(0, None))
     axes.legend(markerscale=3)
+
+
+def _imitated(one: CandidateFit, by: CandidateFit) -> float:
+    """Fraction of a candidate's signal that another one can imitate together with the calibration."""
+    signal = one.gain.signal
+    q, r = np.linalg.qr(by.gain.columns)
+    keep = np.abs(np.diag(r)) > 1e-9 * np.abs(np.diag(r)).max(initial=1e-300)
+    return float(np.sum((q[:, keep].T @ signal) ** 2) / max(signal @ signal, 1e-300))

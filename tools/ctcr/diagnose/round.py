@@ -422,17 +422,8 @@ def decide(
         )
         return
     rivals = [one for one in refitted if one.id != best.id]
-    alike = {one.id for one in rivals if min(imitated(best, one), imitated(one, best)) >= settings.SAME_SIGNAL}
-    same = [one for one in rivals if best.score - one.score < settings.TIE or one.id in alike]
+    same = [one for one in rivals if best.score - one.score < settings.TIE]
     round_.accepted = best
     round_.ids = [best.id, *dict.fromkeys(one.id for one in same)]
     others = [one.score for one in rivals if one.id not in round_.ids]
     round_.margin = best.score - max(others, default=-np.inf)
-
-
-def imitated(one: CandidateFit, by: CandidateFit) -> float:
-    """Fraction of a candidate's signal that another one can imitate together with the calibration."""
-    signal = one.gain.signal
-    q, r = np.linalg.qr(by.gain.columns)
-    keep = np.abs(np.diag(r)) > 1e-9 * np.abs(np.diag(r)).max(initial=1e-300)
-    return float(np.sum((q[:, keep].T @ signal) ** 2) / max(signal @ signal, 1e-300))
