@@ -39,7 +39,7 @@ class InputError(Exception):
 
 
 class ArgumentError(InputError):
-    """What was asked for is wrong, whatever the files hold: an option of a command, or an argument of a function."""
+    """A wrong option of a command or argument of a function, whatever the files hold."""
 
 
 def did_you_mean(name: str, choices: Iterable[str]) -> str | None:

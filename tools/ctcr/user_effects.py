@@ -1,4 +1,4 @@
-"""What a file with effects of one's own imports; see `ctcr.effects.user_effects`."""
+"""Names for a file that defines effects; see `ctcr.effects.user_effects`."""
 
 from ctcr.effects.user_effects import Effect, Parameter, Rows, load
 

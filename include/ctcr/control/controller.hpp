@@ -13,14 +13,14 @@
 
 namespace ctcr {
 
-/// What the controller makes of the force at the tip.
+/// How the controller takes account of a force at the tip.
 enum class TipForce : std::uint8_t {
   unknown,   ///< the model has none
   known,     ///< given by the caller
   estimated  ///< from the deflection of the tip and the compliance
 };
 
-/// What became of a period.
+/// The report on a control period.
 template <class Tasks>
 struct ControlReport {
   Status status = Status::not_converged;  ///< of the period, see advance(); unless ok, the robot is told to stand still
@@ -199,7 +199,7 @@ private:
     return solve<D>(to.model, q, load, to.ws, to.solution, system_.settings);
   }
 
-  /// What the tip has done in the last `reading_age`, by the model [m].
+  /// The motion of the tip in the last `reading_age`, by the model [m].
   Vec3 moved_since_reading() noexcept {
     std::copy_backward(past_.begin(), past_.end() - 1, past_.end());
     past_[0] = now_.solution.position;

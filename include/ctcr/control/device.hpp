@@ -7,7 +7,7 @@
 
 namespace ctcr {
 
-/// What encoders and tracker of a robot read in a period.
+/// The readings of encoders and tracker in a period.
 template <int N>
 struct Measurement {
   MotorAngles<N> theta;  ///< [rad]
@@ -19,7 +19,7 @@ template <class D, int N>
 concept Device = requires(D& device, const MotorAngles<N>& velocity, double period, Measurement<N>& measured) {
   /// Motor velocities [rad/s] for one period [s].
   { device.move(velocity, period) } noexcept -> std::same_as<Status>;
-  /// What encoders and tracker read now.
+  /// The present readings of encoders and tracker.
   { device.measure(measured) } noexcept -> std::same_as<Status>;
 };
 

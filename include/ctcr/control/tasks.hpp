@@ -213,7 +213,7 @@ struct StabilityMargin {
   }
 };
 
-/// What a task has to have.
+/// The requirements on a task.
 template <class Task, int N, class Fx>
 concept ActsAsTask =
     requires(const Task& task, const ControlState<N, Fx>& s, LeastSquares<N>& goals, const JointVelocity<N>& v) {

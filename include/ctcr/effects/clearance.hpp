@@ -157,7 +157,7 @@ inline constexpr std::array parameters{
 /// c F (distance from there), c = 1/k + 1/K, which makes the centre lines part by c F l^3/6 = 2 gap: the inner ones turn
 /// by sqrt(3 gap M / c) / k against tubes that fit, within l = sqrt(12 gap / (c M)).
 ///
-/// That lean lowers the elastic energy, by E(M) with dE/dM = -(angle by which the inner tubes turn against the outer one).
+/// The lean lowers the elastic energy, by E(M) with dE/dM = -(angle by which the inner tubes turn against the outer one).
 /// So a torque of -dE/d(angle of the tube) acts on each tube and turns it to where the tubes bend each other harder. Where
 /// a tube starts to curve or ends within l, moments and curvatures are means of those on its two sides, the side towards
 /// the base with the weight exp(-4 distance / l). `tools/oracle/bore.py` confirms the law without these assumptions.

@@ -12,7 +12,7 @@
 
 namespace ctcr {
 
-/// What a parameter does to an effect, and when a fit frees it.
+/// The part that a parameter plays in its effect. It decides when a fit frees the parameter.
 enum class Role {
   amplitude,  ///< the effect vanishes where all its amplitudes and details are neutral; fitted first
   detail,     ///< a further amplitude, fitted once the effect is known to act
@@ -20,8 +20,8 @@ enum class Role {
   choice      ///< selects one of several forms or constitutive laws; has no derivatives and is never fitted
 };
 
-/// What a parameter measures, where a program can make use of it beyond its value. Parameters of an effect with the same
-/// quantity belong together, in the order given here.
+/// The physical quantity of a parameter, where a program can use more than its value. Parameters of an effect with the
+/// same quantity belong together, in the order given here.
 enum class Quantity {
   other,
   tip_force,  ///< x, y, z of a force at the robot tip, base frame [N]
@@ -67,7 +67,7 @@ struct EffectParameter {
   return {.name = "law", .soft = numbers, .hard = numbers, .role = Role::choice, .meaning = meaning};
 }
 
-/// What measurements must have for an effect to be seen.
+/// Properties that measurements must have to show an effect.
 struct Needs {
   bool order = false;        ///< rows in the order in which they were measured
   bool time = false;         ///< time stamps
@@ -87,7 +87,7 @@ struct StartValue {
   double value = 0;
 };
 
-/// What is known of an effect before any data are.
+/// Prior knowledge of an effect: its description, and how exact its form is.
 struct EffectInfo {
   std::string_view id;  ///< stable: in files, on the command line and in reports
   std::string_view title;

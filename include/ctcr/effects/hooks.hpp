@@ -219,22 +219,22 @@ struct EffectList {
                 "an effect derives from EffectValues<parameters, N, P> (effect.hpp)");
 
   static constexpr bool none = sizeof...(E) == 0;
-  /// Those that change the equilibrium of the rod, in the same order.
+  /// The effects that change the equilibrium of the rod, in the same order.
   using OnRod =
       typename detail::Picked<[]<class Effect> { return ActsOnRod<Effect, double, 2>; }, EffectList<>, E...>::List;
-  /// Those with a force that depends on where the tip is.
+  /// The effects with a force that depends on the position of the tip.
   using OnTip =
       typename detail::Picked<[]<class Effect> { return HasEnvironment<Effect, double>; }, EffectList<>, E...>::List;
-  /// Those on joints.
+  /// The effects on joints.
   using OnJoints =
       typename detail::Picked<[]<class Effect> { return ActsOnJoints<Effect, double, 2>; }, EffectList<>, E...>::List;
   /// The one whose history depends on the relative torsion of the tubes, or none.
   using OnTorsion =
       typename detail::Picked<[]<class Effect> { return DependsOnTorsion<Effect>; }, EffectList<>, E...>::List;
-  /// Those on the reading of the tracker.
+  /// The effects on the reading of the tracker.
   using OnReading =
       typename detail::Picked<[]<class Effect> { return HasSense<Effect, double>; }, EffectList<>, E...>::List;
-  /// Those with some ids, in the same order.
+  /// The effects with some ids, in the same order.
   /// @tparam wanted  wanted(id), id a std::string_view: whether an effect is among them
   template <auto wanted>
   using Those = typename detail::Picked<detail::HasId<wanted>{}, EffectList<>, E...>::List;
@@ -299,7 +299,7 @@ struct EffectList {
       return r;
     }
 
-    /// Those that change the equilibrium of the rod.
+    /// The effects that change the equilibrium of the rod.
     [[nodiscard]] typename OnRod::template On<N, P> on_rod() const noexcept {
       typename OnRod::template On<N, P> r;
       std::apply([&](auto&... effect) { ((effect = std::get<std::remove_cvref_t<decltype(effect)>>(list)), ...); },

@@ -36,7 +36,7 @@ class PathSolver {
   using Vec = VecN<Contacts<N>::count>;
 
 public:
-  /// What the next samples depend on.
+  /// The state on which the next samples depend.
   struct State {
     decltype(TorsionEffect<Fx, N>::History::state) friction;
     RelativeTorsion<N> torsion;

@@ -26,7 +26,7 @@ CTCR_INLINE Four four(const Number& number) noexcept {
   return Four(Lanes{number(0), number(1), number(2), number(3)});
 }
 
-/// That of the first case: only what all four share may be decided by it.
+/// The number of the first case. Decide by it only where all four cases agree.
 CTCR_INLINE double value(const Four& x) noexcept {
   return x[0];
 }

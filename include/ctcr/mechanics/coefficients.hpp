@@ -49,7 +49,7 @@ inline Coefficients<N, P> make_coefficients(const std::array<TubeParameters<P>, 
   return c;
 }
 
-/// What the mechanics uses of each tube. Real time: yes.
+/// The parameters of each tube that the mechanics uses. Real time: yes.
 template <int N>
 inline std::array<TubeParameters<double>, N> tube_parameters(const Robot<N>& robot) noexcept {
   std::array<TubeParameters<double>, N> tubes{};

@@ -13,7 +13,7 @@ enum class Derivatives : std::uint8_t {
   compliance,  ///< J and C, by the joints and by the tip load
 };
 
-/// What loads the robot: each kind has its own, cheapest, equations.
+/// The load on the robot: each kind has its own, cheapest, equations.
 enum class Loading {
   none,    ///< moments inside the tubes only
   force,   ///< tip force: turning the tip about it changes nothing, two unknown turns are left
@@ -57,8 +57,8 @@ struct Columns {
   /// Lane of unknown j: turns of the tip, then psi_2..N.
   static constexpr int unknown(int j) noexcept { return j < turns ? turn + j : psi + j - turns; }
 
-  /// What must be near for lane group g to differ from zero, counted from the robot tip: 1 tube 1, ..., N tube N,
-  /// N + 1 the plate, N + 2 nothing (it always is zero).
+  /// Lane group g is zero from the robot tip up to the number returned: 1 the tip of tube 1, ..., N that of tube N,
+  /// N + 1 the plate, N + 2 everywhere.
   static constexpr int starts_with(int g) noexcept {
     if (g * lane_count < psi) return 1;
     for (int tube = 1; tube < N; ++tube)

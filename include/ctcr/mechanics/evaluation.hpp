@@ -187,7 +187,7 @@ CTCR_INLINE void integrate(const Coefficients<N>& c, const Joints<N>& q, const S
                              record);
 }
 
-/// What follows from state and frame at the front plate; out.axis and out.tips are there already.
+/// Computes the outputs from state and frame at the front plate; out.axis and out.tips are set already.
 template <Derivatives D, Loading L, int N, class S>
 CTCR_INLINE void assemble(const Joints<N>& q, const TipLoad& load, const TipGuess<N>& guess, const RobotState<S, N>& base,
                      const Frame<S>& f, Evaluation<N, L, D>& out) noexcept {

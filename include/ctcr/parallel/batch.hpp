@@ -11,7 +11,7 @@
 
 namespace ctcr {
 
-/// What a solve is asked for.
+/// The input of one solve.
 template <int N>
 struct Configuration {
   Joints<N> joints;

@@ -62,7 +62,7 @@ public:
 private:
   [[nodiscard]] const Model<N, Fx>& model() const noexcept { return prediction_.model; }
 
-  /// Those of the list Some.
+  /// The effects of the list Some.
   template <class Some>
   [[nodiscard]] auto effects(const Window& window) const noexcept {
     return variables_.template effects<Some>(model().effects(), window, [&](double x, int state) {

@@ -33,7 +33,7 @@ public:
   using Effect = TorsionEffect<Fx, N, S>;
   using Row = typename Path<N, S>::Row;
 
-  /// What is given must outlive this.
+  /// Keeps references to its arguments: they must outlive it.
   HistoryPropagation(const System<N, Fx>& system, std::span<const RecordedRow<N>> rows, const RecordedPath<N>& path,
                      const Variables<N, Fx>& variables, const Window& window) noexcept
     : transmission_(&system.transmission),

@@ -8,8 +8,8 @@
 
 namespace ctcr::detail {
 
-/// What a parameter of a system changes: what the tracker makes of the tip, the tip by the equations of the standard
-/// model, or these equations.
+/// How far a parameter of a system reaches: it changes the reading of a given tip, the tip by the equations of the standard
+/// model, or these equations themselves.
 enum class Reach { reading, tip, equations };
 
 /// Of each parameter of SystemParameters<N, Fx>.

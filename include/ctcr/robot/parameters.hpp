@@ -32,7 +32,7 @@ enum class Parameter : int {
   sensor_rotation
 };
 
-/// What is known of a kind of parameter before any robot is.
+/// A kind of parameter: its properties in every robot.
 struct ParameterKind {
   std::string_view name;           ///< '#' stands for the number of a tube, innermost 1, '*' for x, y or z
   std::string_view unit;           ///< SI; empty: a pure number

@@ -36,7 +36,7 @@ struct PoseSensor {
   return {seat.rotation * sensor.T_tip_sensor.rotation, seat.position};
 }
 
-/// What the sensor reads of the tubes' tips T_base_tip. Real time: yes.
+/// The reading of the sensor where the tubes' tips are at T_base_tip. Real time: yes.
 template <std::size_t N>
 [[nodiscard]] Pose reading(const PoseSensor& sensor, const std::array<Pose, N>& tube_tips) noexcept {
   return seated(sensor, seat(sensor, tube_tips[std::size_t(sensor.tube)]));

@@ -17,7 +17,7 @@ struct Prediction {
   Pose reading;  ///< T_tracker_sensor
 };
 
-/// What the tracker will read when the motors stand at theta and `load` acts on the robot tip.
+/// The predicted reading of the tracker when the motors stand at theta and `load` acts on the robot tip.
 /// @return as solve(); invalid_settings: check_sensor(), nothing is computed. Real time: yes.
 template <int N>
 Status predict(const System<N>& system, const MotorAngles<N>& theta, const TipLoad& load, Workspace<N>& ws,

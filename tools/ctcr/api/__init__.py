@@ -1,1 +1,1 @@
-"""What `import ctcr` offers as functions: the way of a table through the rooms, which the commands take too."""
+"""The functions of `import ctcr`: each takes a table through the rooms, as its command does."""

@@ -53,7 +53,7 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
 
 
 def _fitted(robot: Robot, readings: Measurements, found: Review) -> tuple[list[str], dict[str, float]]:
-    """What a fit to the readings tells: sentences on what each run has of its own, and the floors of the error."""
+    """Results of a fit to the readings: sentences on frames and homes of single runs, and the floors of the error."""
     said: list[str] = []
     if not found.wrong:
         readings, said = sessions.of_runs(robot, readings)

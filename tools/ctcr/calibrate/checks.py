@@ -1,4 +1,4 @@
-"""What is wrong with, or worth knowing of, a table that is to be fitted."""
+"""Faults of a table that is to be fitted, and notices on it."""
 
 import numpy as np
 
@@ -68,7 +68,7 @@ def outlier_rows(fit: Fit, readings: Measurements) -> list[int]:
 
 
 def notices(robot: Robot, readings: Measurements, fit: Fit, few: Fit) -> list[str]:
-    """What the user should know of a fit, in sentences; `few`: the fit to a part of its rows, where they are many."""
+    """Notices on a fit, in sentences; `few`: the fit to a part of its rows, where they are many."""
     unexplained = any(text.startswith(floors.UNEXPLAINED) for text in fit.warnings)
     explained = not unexplained or floors.explains(few, noise_of_readings(robot, readings))
     said = [wider.sentence for wider in widened(robot, fit.priors.scales)]

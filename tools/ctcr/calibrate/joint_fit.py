@@ -112,7 +112,7 @@ class Calibration(Result):
 
     @property
     def doubts(self) -> list[str]:
-        """What speaks against the values, in sentences."""
+        """Reasons to doubt the values, in sentences."""
         return [*checks.limits(self.fit), *fields.doubts(self.fitted)]
 
     @property
@@ -244,7 +244,7 @@ def calibrate(
 
 
 def _change(c: Calibration) -> tuple[list[ledger.Change], ledger.Entry, dict[str, Any] | None]:
-    """What a fit changes in the robot file, its entry of the ledger, and the effects where they changed."""
+    """The changes of the robot file by a fit, its entry of the ledger, and the effects where they changed."""
     rms_mm = c.rms("rms_mm") | {"noise_floor": c.floors.expected_error_mm}
     figures = {"rms_mm": rms_mm, "reduced_chi_square": c.fit.reduced_chi_square}
     if np.isfinite(c.floor.rms_deg):

@@ -87,7 +87,7 @@ class Outcome:
 
     @property
     def changes(self) -> list[Change]:
-        """What changes in the robot file. The ledger holds no deviations of the components of a rotation vector."""
+        """The changes of the robot file. Components of a rotation vector have no standard deviation in the ledger."""
         updating = [row for row in self.rows if row.path]
         return [Change(row.path, row.unit, row.value, None if row.unit == "rad" else row.sd) for row in updating]
 
@@ -133,7 +133,7 @@ def _sd_in_file(robot: Robot | None, path: FieldPath) -> float:
 
 
 def by_robot(robot: Robot, function: Callable[[Array], float], *names: str) -> tuple[float, float]:
-    """What a function of parameters (SI) is by the robot file, and its standard deviation (linearised)."""
+    """A function of parameters (SI) at the robot file's values, and its standard deviation (linearised)."""
     values, step = parameters.values(robot, names), 1e-3  # standard deviations
     changes = np.diag([step * (stated_sd(robot, name) or 0.0) for name in names])
     part = np.array([function(values + change) - function(values - change) for change in changes]) / (2 * step)
@@ -188,7 +188,7 @@ def _contradiction(row: Row) -> str:
 
 
 def _odd(outcome: Outcome, robot: Robot | None) -> Iterator[checks.Fault]:
-    """What looks wrong of the values by themselves: without a robot by their units, else in the robot with them."""
+    """Implausible values: without a robot judged by their units, else as values of its file."""
     if robot is None:
         known = [(row, *Robot.owner(row.path)) for row in outcome.rows if row.path]
         quantities = [(row, section.quantity(key)) for row, section, key in known]

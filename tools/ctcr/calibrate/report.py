@@ -128,7 +128,7 @@ def _opening(c: Calibration) -> str:
 
 
 def _fit(c: Calibration) -> list[str]:
-    """What the fit gains, the parameters, and how far the data determine them."""
+    """How far the fit reduces the error, the parameters, and how well the data determine them."""
     shown, lines = min(len(c.fitted), figures.MOST_NAMES), undetermined(c)
     gain = "From the robot file's values to the expected error. The error that counts is the one of held-out readings."
     values = (

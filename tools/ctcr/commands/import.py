@@ -105,7 +105,7 @@ def command(log, target, robot, joint_log, mapping, save_mapping, listed, out, *
 
 
 def _show(out, source, rows) -> None:
-    """What the columns were taken for, before anything is written."""
+    """Shows the meaning that each column was given, before anything is written."""
     title = f"{source.log.path}: {source.log.kind}, {len(source.log)} rows"
     shown = [[row.column, row.unit, row.becomes, row.how] for row in rows]
     out.table(title, ["column", "unit", "becomes", "how"], shown, 4)

@@ -1,4 +1,4 @@
-"""What commands share: arguments, options, loading, and `Output`, which gives a result back.
+"""Shared by commands: arguments, options, loading, and `Output`, which gives a result back.
 
 Each option exists once, as a decorator. Heavy imports are late: `ctcr --help` loads this file.
 """

@@ -124,7 +124,7 @@ def find_run_offsets(sample: Sample, stops: Stops, revisits: Revisits, noise: No
 
 
 def _far_runs(sample: Sample, label: Integers, distant: Mask) -> Mask:
-    """Those of the runs whose mean error is an outlier that their joints cannot explain.
+    """The distant runs whose joints cannot explain why their mean error is an outlier.
 
     Runs visit different joints, so their errors may differ. But between two readings the error hardly changes by more
     than the tip moves: a change far beyond the joint distance to the nearest reading of another run belongs to the run.

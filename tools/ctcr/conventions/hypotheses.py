@@ -31,7 +31,7 @@ POSE, QUATERNION, FORCE = (group_columns(1)[name] for name in ("position", "quat
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """What may be wrong, and the table or the robot file as it should be."""
+    """A convention that may be wrong, and the correction of the table or of the robot file."""
 
     kind: str
     text: str
@@ -108,7 +108,7 @@ def joints(kind: str, tubes: tuple[int, ...]) -> tuple[str, ...]:
 
 
 def named(kind: str, tubes: tuple[int, ...], n_tubes: int) -> str:
-    """Those joints as the subject of a sentence."""
+    """The joints of these tubes as the subject of a sentence."""
     return f"all {kind}s" if len(tubes) == n_tubes > 1 else join(joints(kind, tubes))
 
 

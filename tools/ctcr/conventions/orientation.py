@@ -20,9 +20,9 @@ INVERSE = ("quaternion_inverse", "the quaternions are those of the inverse rotat
 
 
 def wrong_form(fit: Calibrated, readings: Measurements, axis: int | None = None) -> tuple[list[Finding], Change]:
-    """What is wrong with the quaternions of readings whose positions fit, and the change that corrects them.
+    """Faults in the quaternions of readings whose positions fit, and the change that corrects them.
 
-    axis: of the tracker, along which they are mirrored.
+    axis: the axis of the tracker along which they are mirrored
     """
     given = readings.quaternions
     use = fit.solved & readings.oriented
@@ -120,7 +120,7 @@ def _turn_between(predicted: Array, measured: Array) -> Rotation:
 
 
 def _turned(fit: Calibrated, turn: Rotation, error_deg: tuple[float, float]) -> Finding:
-    """That the sensor is turned against what the robot file says."""
+    """The finding that the sensor is turned against its rotation in the robot file."""
     vector = (Rotation.from_rotvec(fit.robot.tracker.sensor_rotation_vector) * turn).as_rotvec()
     text = f"the sensor is turned by {np.degrees(turn.magnitude()):.0f} deg against what the robot file says"
     fix = f"set tracker.sensor_rotation_vector_rad to {numbers(vector, 3)}, or to null: ctcr calibrate fit finds it"

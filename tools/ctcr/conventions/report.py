@@ -28,8 +28,9 @@ def as_diagnosis(review: Review) -> dict[str, Any]:
 
 
 def _explanations(review: Review) -> list[dict[str, Any]]:
-    """What is found together, the same with a rival in place of one finding, which explains the readings as well, and a
-    cause that is no convention, with the prior odds of one outside the catalogue: the errors tell it from none."""
+    """Explanations that share the probability: all findings together; the same with one finding replaced by a rival
+    that explains the readings as well; and a cause that is no convention. The errors do not tell that cause from the
+    others, so it keeps the prior odds of a cause outside the catalogue."""
     texts = [one.text for one in review.findings]
     sets = [texts]
     for k, one in enumerate(review.findings):

@@ -49,7 +49,7 @@ def _minorities(fit: Calibrated, readings: Measurements) -> Iterator[Integers]:
 
 
 def _explained(fit: Calibrated, readings: Measurements, some: Integers) -> tuple[Finding, Change] | None:
-    """What is clearly different in some runs."""
+    """The clear difference between some runs and the others, as a finding with its correction; None without any."""
     clear, theirs = settings.CONVENTION_CLEAR, np.isin(readings.run, some)
     rest, mine = readings.rows(~theirs), readings.rows(theirs)
     like = calibrated(fit.robot, rest)

@@ -91,7 +91,7 @@ def corrected(robot: Robot, readings: Measurements, of_runs: Measurements) -> tu
 
 
 def _unexplained(case: Case, error: float, found: list[Finding]) -> str:
-    """That an error [m] is left which is no physics, and what comes nearest."""
+    """A sentence on an error [m] that no physics explains, and the hypothesis that comes nearest to an explanation."""
     left = f"{short(1e3 * error)} mm remain" if np.isfinite(error) else "the model has no solution"
     part = case.share_of(error)
     share = f", {percent(part)} of the deployed length" if np.isfinite(part) else ""
@@ -105,7 +105,7 @@ def _unexplained(case: Case, error: float, found: list[Finding]) -> str:
 
 
 def _clearest(case: Case) -> Tried | None:
-    """What leaves far less error than the table as it is and than all else, one hypothesis or two; None without any."""
+    """The one or two hypotheses that leave far less error than the table as it is and than all others; None without."""
     if not case.fit.may_be_beaten:
         return None
     singles, pairs = _likely(case)
@@ -127,8 +127,7 @@ def _clearest(case: Case) -> Tried | None:
 
 
 def _alike(tried: list[Tried]) -> list[Tried]:
-    """Those that leave the least error, or hardly more, and that the orientations do not deny; first the one by which
-    least is wrong."""
+    """The sets that leave the least error, or hardly more, and agree with the orientations; fewest doubts first."""
     least = min(one.case.fit.typical for one in tried)
     alike = [one for one in tried if one.case.fit.typical < settings.CONVENTION_ALIKE * least]
     turned = min(one.turned_deg for one in alike)
@@ -160,7 +159,7 @@ def _exchanged(case: Case, pair: Tried) -> Iterator[Wrong]:
 
 
 def _clear(case: Case, some: Iterable[Wrong]) -> list[Tried]:
-    """Those that leave far less error than the table as it is, and than without one of their hypotheses."""
+    """The sets of hypotheses that leave far less error than the table as it is, and than without any one of them."""
     tried = (Tried(wrong, _applied(case, wrong)) for wrong in some)
     return [one for one in tried if one.case.fit.typical < case.fit.typical and all(_needed(case, one))]
 

@@ -199,7 +199,7 @@ def add(
 
 
 def _change(added: Added) -> tuple[list[Change], Entry]:
-    """What the fit changes in the robot file beside its effects, and its entry of the ledger."""
+    """The changes of the robot file beside its effects, and the entry of the ledger."""
     before = added.before
     changes = fields.changes(added.fit, before, added.after)
     rms_mm = added.rms("rms_mm") | {"noise_floor": added.floors.expected_error_mm}

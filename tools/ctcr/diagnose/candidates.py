@@ -45,7 +45,7 @@ class Candidate:
 
 
 def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate], dict[str, str]]:
-    """Those that these data can show, and why not for other effects."""
+    """The candidates that these data can show; for each other effect the reason why they cannot."""
     found, not_testable = [], {}
     for effect in catalogue.all_effects(robot.n_tubes).values():
         reason = _not_testable(effect, robot, measurements)
@@ -61,9 +61,9 @@ def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate
 
 
 def forms(effect: Effect, candidate: Candidate, rejected_variants: Collection[str] = ()) -> list[Candidate]:
-    """What an accepted candidate may become: each constitutive law of the effect with its shape free, by the amplitudes
-    with which it entered or by all of a wider variant. A local source is fitted only where a variant had found its
-    position, in the candidate or among the full names `rejected_variants`."""
+    """The forms that an accepted candidate may take: each constitutive law of the effect with its shape free, and with
+    the amplitudes of the candidate or of a wider variant. A local source is fitted only where a variant found its
+    position: that of the candidate, or one of the full names `rejected_variants`."""
     source, laws = set(effect.names_with("source")), set(effect.laws)
     rest = {name: value for name, value in candidate.shape if name not in laws}
     starts = [candidate.shape]

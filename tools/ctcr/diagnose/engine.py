@@ -105,15 +105,15 @@ class Engine:
     def fit_like(
         self, other: joint.Fit, added: Iterable[str] = (), start: dict[str, float] | None = None, **options: Any
     ) -> joint.Fit:
-        """As fit(), at the noise, weights and inflation of another fit, so that their evidences can be compared; from
-        its values or a near start."""
+        """Like fit(), with the noise, weights and inflation of another fit, so that their log evidences can be
+        compared. It starts at the values of that fit, or at `start`, which lies near them."""
         options = {"noise": other.noise, "near": True, "like": other.model} | other.frozen | options
         return self.fit(added, start=values_of(other) if start is None else start, **options)
 
     def fit_with_field(
         self, added: Sequence[str], start: dict[str, float], fixed: dict[str, float] | None = None
     ) -> joint.Fit:
-        """As fit(), under that part of the tracker's stated field error which makes the readings likeliest."""
+        """Like fit(), with the fraction of the tracker's stated field error that makes the readings likeliest."""
 
         def again(values: Array, like: joint.Fit | None) -> joint.Fit:
             from_there = dict(zip(full.names, map(float, values), strict=True))

@@ -13,7 +13,7 @@ from ctcr.arrays import Array
 
 @dataclass(frozen=True)
 class Gain:
-    """What further parameters would bring."""
+    """The linearised improvement of a fit by further parameters."""
 
     log_evidence: float  # over the fit without them
     values: Array  # (k,) over their neutral values

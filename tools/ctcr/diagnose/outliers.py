@@ -21,13 +21,13 @@ def outliers(fit: Any, admitted: float = 1.0, *, rotation: bool = False) -> Mask
 
 
 def beyond_noise(fit: Any, *, rotation: bool = False) -> Mask:
-    """Those by the noise as stated, or as far as it had to be inflated."""
+    """Outliers (M,) under the stated noise, or under the inflated noise of the fit."""
     return outliers(fit, max(1.0, fit.inflation[int(rotation)]), rotation=rotation)
 
 
 def isolated(measurements: Measurements, fit: Any, rows: Mask) -> Mask:
-    """Those of `rows` (M,) that are outliers though their neighbours are not, in time within their run and in joints
-    and load: errors of the tracker, or snaps to an equilibrium that nothing else shows. None where there are many."""
+    """Outliers among `rows` (M,) whose neighbours, in time within the run and in joints and load, are none: errors of
+    the tracker, or snaps to another equilibrium that no other reading shows. None where there are many."""
     read = np.flatnonzero(np.isfinite(fit.residual[:, :3]).all(axis=1))
     found = np.zeros(len(measurements), bool)
     if len(read) < 2:

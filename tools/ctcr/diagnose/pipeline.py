@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 @dataclass(repr=False)
 class Diagnosis(Result):
-    """What was tried and found, and the verdict."""
+    """The course of the selection, the effects that were found, and the verdict."""
 
     PAGE = "diagnose.report"
     PICTURE = "diagnose.figures", "waterfall", 5.2, 3.8

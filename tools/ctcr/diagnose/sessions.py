@@ -222,7 +222,7 @@ def _moved_alone(sessions: Sessions) -> list[str]:
 
 
 def _not_shared(explained: Mapping[tuple[str, ...], float]) -> list[str]:
-    """What may differ between runs beside their frames, in a sentence with a question; none where nothing does."""
+    """A sentence with a question on parameters that may differ between runs beside their frames; none without any."""
     if not explained:
         return []
     best = max(explained.values())

@@ -74,7 +74,7 @@ class VaryingModel:
 
     @property
     def measure(self) -> list[str]:
-        """What to measure next, each once."""
+        """Measurements to make next, each once."""
         return list(dict.fromkeys(v.measure for v in self.variations))
 
     @property

@@ -30,7 +30,7 @@ def settings(given: Iterable[str], robot: Robot, ids: Sequence[str] = ()) -> dic
 
 
 def diagnosed(path: str | Path, robot: Robot) -> tuple[list[str], dict[str, float], dict[str, float]]:
-    """As found(), of the file that `ctcr diagnose --json` wrote. Raises InputError where it is not such an answer."""
+    """Like found(), from a file that `ctcr diagnose --json` wrote. Raises InputError where it is no such file."""
     content = inputs.read(path, "this is not an answer of ctcr diagnose --json")
     try:
         return found(json.loads(content), robot)

@@ -124,7 +124,7 @@ def is_free(names: list[str]) -> bool:
 
 
 def _opening(robot: Robot) -> Iterator[str]:
-    """What the header is, and where its numbers come from."""
+    """The opening comment: the purpose of the header, and the source of its numbers."""
     yield f"// The robot {_quoted(robot.name)}: tubes, homes, frames, effects and limits, and the model of them."
     source = f" from {_quoted(Path(robot.file).name)}" if robot.file else ""
     yield f"// Exported by ctcr {version('ctcr')} on {date.today().isoformat()}{source}: change that, not this header."

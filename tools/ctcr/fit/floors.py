@@ -103,5 +103,5 @@ def explains(fit: Fit, stated: Noise) -> bool:
 
 
 def warnings(fit: Fit, explained: bool) -> list[str]:
-    """Those of a fit; where the noise explains what it leaves, without those that say otherwise."""
+    """The warnings of a fit; where the noise explains its residual, without those that say otherwise."""
     return [text for text in fit.warnings if not (explained and text.startswith(UNEXPLAINED))]

@@ -136,8 +136,8 @@ def fit_joint(
 
 
 def _fit_widened(model: ResidualModel, priors: Priors, noise: Noise, positions: Array, how: FitOptions) -> Fit:
-    """As fit_joint(), of the active rows. Uncertainties that the readings contradict are widened, which changes what
-    the readings say: fits and scales alternate until little is gained."""
+    """Like fit_joint(), on the active rows. It widens stated uncertainties that the readings contradict. Wider priors
+    change the fit, so fits and scales alternate until the log evidence gains little."""
     if how.scales is not None:
         priors = replace(priors, scales=how.scales)
     fit = _fit_active(model, priors, noise, positions, how)
@@ -155,8 +155,8 @@ def _fit_widened(model: ResidualModel, priors: Priors, noise: Noise, positions: 
 
 
 def _fit_active(model: ResidualModel, priors: Priors, noise: Noise, positions: Array, how: FitOptions) -> Fit:
-    """As fit_joint(), of the active rows within the priors as they are. With distributed friction the friction path
-    depends on the parameters: fits and solutions of the path alternate until the path hardly changes."""
+    """Like fit_joint(), on the active rows with the priors as they are. With distributed friction the friction path
+    depends on the parameters, so fits and solutions of the path alternate until the path hardly changes."""
     began, starts = perf_counter(), how.starts
     start = np.asarray(priors.mean if how.start is None else how.start, dtype=float)
     try:
@@ -261,9 +261,9 @@ def linear_fit(
     weights: Array | None = None,
     **options,
 ) -> Fit:
-    """As fit_joint() with the parameters of a fit, but of the model linearised there: other noise, rows (M,) or weights
-    (M, 2) are cheap. Weights of 0 leave rows out, so that `rows` count only without any. `more` (M, 6) is added to the
-    residual. The fit has the rows `only` (M,) alone, and then weights are of these."""
+    """Like fit_joint() with the parameters of a fit, but with the model linearised there: other noise, rows (M,) or
+    weights (M, 2) are cheap. `rows` are used only where no weights are given; a weight of 0 leaves a row out. `more`
+    (M, 6) is added to the residual. With `only` (M,) the fit holds these rows alone, and `weights` belongs to them."""
     residual, jacobian, positions = at.residual + more, at.jacobian_all, at.positions
     if weights is None and rows is not None:
         residual = np.where(rows[:, None], residual, nan)

@@ -1,4 +1,4 @@
-"""What a joint fit found: the maximum a posteriori estimate and its Laplace approximation."""
+"""The result of a joint fit: the maximum a posteriori estimate and its Laplace approximation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -24,7 +24,7 @@ from ctcr.robot.description import Robot
 
 @dataclass(frozen=True)
 class Priors:
-    """What is known of n parameters before the readings, SI: a normal distribution within bounds."""
+    """The prior distribution of n parameters, SI: normal within bounds."""
 
     names: list[str]
     mean: Array  # (n,)
@@ -49,7 +49,7 @@ class Priors:
         return cls(list(names), *known, gauges, limits, groups, correlations)
 
     def some(self, chosen: Mask) -> "Priors":
-        """Those of some parameters (n,), without gauges and limits, which combine several."""
+        """The priors of some parameters (n,), without gauges and limits, which combine several."""
         names = [name for name, kept in zip(self.names, chosen, strict=True) if kept]
         parts = (part[chosen] for part in (self.mean, self.stated, self.low, self.high))
         groups = [group for group, kept in zip(self.groups, chosen, strict=True) if kept]

@@ -55,7 +55,7 @@ class Widened:
 
 
 def widened(robot: Robot, scales: Scales) -> list[Widened]:
-    """What the scales of a fit say of the robot file."""
+    """The numbers of the robot file's `uncertainty` that a fit had to scale."""
     places = {group: key_and_index(group) for group in scales}
     stated = {group: robot.uncertainty.of(key, index or 0) for group, (key, index) in places.items()}
     return [Widened(group, stated[group], factor) for group, factor in scales.items()]

@@ -1,4 +1,4 @@
-"""What a user says about the logs of a laboratory, by options and in a small YAML file kept for the next log."""
+"""The user's choices on the logs of a laboratory, from options and from a small YAML file kept for the next log."""
 
 import re
 from dataclasses import replace

@@ -132,7 +132,7 @@ def _check_values(columns: Columns, moving: Columns, moved: Motion, position, qu
 
 
 def _hint(beta: Array, choices: Choices) -> str:
-    """What joints that cannot be are probably."""
+    """The probable cause of impossible joints, as a hint."""
     far = (np.abs(beta) > measurements.QUANTITIES["beta"].usual[1]).any(axis=1)
     if 0 < far.mean() < 0.5:
         return "if it stands for what is missing, say so as it stands in the log, such as --missing -9999"

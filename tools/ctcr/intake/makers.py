@@ -25,7 +25,7 @@ Rows = list[tuple[int, list[str]]]  # number of the line in the file, from 1; fi
 
 
 def reader_of(rows: Rows) -> Callable[[Path, Rows], Log] | None:
-    """What reads the rows of a file, where a maker's program wrote it."""
+    """The reader of a file that a maker's program wrote, by the file's rows; None for other files."""
     first = next((fields for _, fields in rows if any(fields)), [])
     if first and first[0].strip().strip('"') == "Format Version":
         return _motive

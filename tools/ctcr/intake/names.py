@@ -1,4 +1,4 @@
-"""What the name of a column suggests: "tube2_rot [deg]" is the rotation of tube 2 in degrees."""
+"""The meaning of a column by its name: "tube2_rot [deg]" is the rotation of tube 2 in degrees."""
 
 import re
 import unicodedata
@@ -88,7 +88,7 @@ def with_middle(names: tuple[str, ...]) -> list[str]:
 
 
 def meaning(name: str) -> Meaning | None:
-    """What a name suggests, None for nothing. Some roles wait for their neighbours.
+    """The meaning that a name suggests, None without any. Some roles are settled only with the neighbouring columns.
 
     ox, oy, oz, ow: orientation, a quaternion where there is an ow, else angles. m1 to m16, or m11 to m44: a matrix.
     """
@@ -112,7 +112,7 @@ def meaning(name: str) -> Meaning | None:
 
 
 def _meaning(text: str, unit: Unit | None) -> Meaning | None:
-    """What a name without its unit suggests."""
+    """The meaning that a name without its unit suggests."""
     words = _words(text)
     rank = _GIVEN * bool(_COMMANDED & set(words))
     words = [word for word in words if word not in _COMMANDED | _MEASURED]
@@ -157,7 +157,7 @@ def _unit(name: str) -> tuple[Unit | None, str]:
 
 
 def _unknown(text: str) -> Unit | None:
-    """What stands in brackets, where it is one word that says nothing else."""
+    """The text in brackets as an unknown unit, where it is one word without another meaning."""
     is_word = re.fullmatch(r"[\d.]*\s*[^\W\d_][\w./^]*", text) and not set(_words(text)) & _REMARKS
     is_word = is_word and not _DATE.fullmatch(text.lower())
     return units.unknown(text) if is_word else None

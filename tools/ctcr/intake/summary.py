@@ -1,4 +1,4 @@
-"""What an import says of itself: what each column was taken for, and the choices for the next log."""
+"""The summary of an import: the meaning that each column was given, and the choices for the next log."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

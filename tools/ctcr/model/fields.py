@@ -111,7 +111,7 @@ def fitted(fit: Any) -> list[Fitted]:
 
 
 def changes(fit: Any, before: Robot, after: Robot) -> list[Change]:
-    """What a fit changes in the file; a turn of the tracker frame, or of the sensor, changes its rotation vector."""
+    """The changes of the file by a fit; a turn of the tracker frame, or of the sensor, changes its rotation vector."""
     made = []
     for name, sd in zip(fit.names, fit.sd, strict=True):
         field = field_of(name)

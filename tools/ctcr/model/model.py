@@ -35,8 +35,8 @@ INTEGRATORS = {
 
 @dataclass(frozen=True, repr=False)
 class Prediction(Shown):
-    """What the model says of M configurations, base frame if not asked for in another. NaN where there is no solution:
-    `why` says why."""
+    """The predicted poses of M configurations, in the base frame unless asked for in another. NaN where there is no
+    solution: `why` says why."""
 
     position: Array  # (M, 3) [m], tip of the tube that carries the sensor
     quaternion: Array  # (M, 4), w first and not negative
@@ -103,7 +103,7 @@ class Shape:
 
 
 def status_text(code: int) -> str:
-    """What a status code of a prediction means, in plain words."""
+    """The meaning of a prediction's status code, in plain words."""
     return _core.status_text(_core.Status(code))
 
 

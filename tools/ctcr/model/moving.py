@@ -43,7 +43,7 @@ class MovingModel:
             self._remember(self._recent.pop(0))
 
     def reading(self) -> tuple[Array, Array]:
-        """What the tracker reads without noise, now: position (3,) [m], quaternion (4,); NaN where unsolved."""
+        """The present reading of the tracker without noise: position (3,) [m], quaternion (4,); NaN where unsolved."""
         t, joints, force = (np.array(column) for column in zip(*self._turns, *self._recent, strict=True))
         end = max(SESSION_S + self._start, t[-1] + 1.0)  # the session goes on behind the last row
         joints, force = (np.vstack([column, column[-1:]]) for column in (joints, force))

@@ -33,7 +33,7 @@ def noise_of(robot: Robot, field: bool = True, kinds: Sequence[str] = ("position
 
 
 def noise_of_readings(robot: Robot, measurements: Measurements, field: bool = True) -> Noise:
-    """As noise_of(), for the kinds of readings in the table: without orientations their jitter need not be stated."""
+    """Like noise_of(), for the kinds of readings in the table: without orientations their jitter need not be stated."""
     readings = {"position": measurements.positions, "rotation": measurements.quaternions}
     kinds = [kind for kind, of in readings.items() if np.isfinite(of).all(axis=1).any()]
     return noise_of(robot, field=field, kinds=kinds)

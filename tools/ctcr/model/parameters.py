@@ -108,7 +108,7 @@ def field_of(name: str) -> Field:
 
 
 def value_at(robot: Robot, path: FieldPath) -> Any:
-    """What the robot has in a field of its file; None where it, or what would hold it, is left out."""
+    """The value of a field of the robot file; None where the file lacks the field or a section that would hold it."""
     value = robot
     for step in path:
         if value is not None:
@@ -266,11 +266,12 @@ def known_directions(robot: Robot, names: list[str]) -> list[tuple[str, Array]]:
 
 
 def admissible(robot: Robot, beta: Array, names: list[str]) -> list[tuple[str, Array, float]]:
-    """What must stay true of the named parameters for joints beta (M, N) [m] of a table to be possible.
+    """Linear constraints on changes of the named parameters that keep joints beta (M, N) [m] of a table possible.
 
-    Each with words for where it just is, and as the least value of a sum of changes of the parameters: tubes are
-    grasped behind the plate and one behind the other, tips are in front of it and one before the other, and no tube is
-    longer curved than it is long. 99 rows in 100 stay possible; where fewer are, none more become impossible.
+    Each holds words for the limit itself, the coefficients of the changes, and the least value of their sum. Tubes are
+    grasped behind the plate, an inner one behind an outer one. Tips lie in front of it, an inner one before an outer
+    one. The curved part of a tube is no longer than the tube. 99 rows in 100 stay possible; where fewer are possible at
+    first, no further ones become impossible.
     """
     beta = beta + robot.actuation.translation_correction
     tip, last = beta + robot.lengths, robot.n_tubes

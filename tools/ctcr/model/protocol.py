@@ -1,4 +1,4 @@
-"""What a joint fit needs of a model of recorded readings."""
+"""The protocol of a residual model: all that a joint fit needs of a model of recorded readings."""
 
 from collections.abc import Sequence
 from typing import Any, Protocol

@@ -85,7 +85,7 @@ class SessionRecording(ResidualModel):
         return columns[:, 0], columns[:, 1:], bool(np.isfinite(residual).any())
 
     def moves(self, x: Array) -> Array:
-        """What each run has of its own at these parameters (R, k), beside its session."""
+        """The best changes (R, k) of each run's own values at these parameters, relative to its session."""
         self.activate([True] * len(self.readings))
         residual = self.table.residual(x)[0]
         moves = np.zeros((len(self.readings.sessions.run), len(self.sd)))

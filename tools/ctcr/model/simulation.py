@@ -27,7 +27,7 @@ WAVES = 400  # of which the smooth field is the sum
 
 
 def simulate(robot: Robot, plan: Measurements, noise: str = "jitter", seed: int = 1, steps: int = 4) -> Measurements:
-    """What the tracker reads in the rows of a plan, as the robot with its effects moves along them.
+    """Simulated readings of the tracker in the rows of a plan, along which the robot moves with its effects.
 
     Noise: none; jitter, that of the robot file; realistic, with the smooth error of the tracker's field and outliers
     too. Rows that the model cannot solve have no pose. Raises InputError where the robot file does not state the noise.
@@ -63,7 +63,7 @@ def as_built(robot: Robot, rng: np.random.Generator) -> Robot:
 
 
 class ReadingNoise:
-    """What a tracker adds to poses: jitter, and for "realistic" the smooth error of its field and outliers.
+    """Simulated errors of a tracker: jitter, and for "realistic" the smooth error of its field and outliers.
 
     One field stays as long as the object. Raises InputError where the robot file does not state the noise.
     """

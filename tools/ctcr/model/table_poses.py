@@ -38,7 +38,7 @@ def predict(
 
 
 def readings(robot: Robot, table: Measurements, steps: int = 4) -> Prediction:
-    """What the tracker would read in all rows in their order, with all effects of the robot, seen from its base frame.
+    """Predicted readings of all rows in their order, with all effects of the robot, seen from its base frame.
 
     The stability is not known: NaN.
     """

@@ -126,7 +126,7 @@ class UserRecording(ResidualModel):
         return position, quaternion
 
     def residual(self, x: Array, derivatives: bool = False) -> tuple[Array, Array, bool]:
-        """As of a ResidualModel; usable where every row was solved that is solvable at the file's values."""
+        """Like ResidualModel.residual(); usable where every row was solved that is solvable at the file's values."""
         values = self._values(x)
         inner = self._prepared(values)
         wanted = self._active & self._solvable

@@ -1,4 +1,4 @@
-"""What to measure next, to tell apart what the measurements so far cannot."""
+"""Further measurements that tell apart explanations which the present ones cannot."""
 
 from ctcr.plan.proposal import Proposal, propose
 

@@ -35,7 +35,7 @@ def scenarios(repetitions: int, advance: Callable[[float], None]) -> Scenarios:
 
 
 def tracking_claims(s: Scenarios) -> list[Claim]:
-    """What the paper says of S1 to S4, and S5 beside it."""
+    """The paper's claims on S1 to S4, with S5 beside them."""
     of = {key: figures(runs) for key, runs in s.runs.items()}
 
     def failed(name: str, *masses: float) -> float:

@@ -62,7 +62,7 @@ def _as_measured(one: Varied) -> Varied:
 
 
 def claims(s: Influence) -> list[Claim]:
-    """What the paper says of wrong parameters."""
+    """The paper's claims on wrong parameters."""
 
     def total(study: closed_loop.ClosedLoop, *kinds: str, of: str = "worst_maximum") -> float:
         return 1e3 * sum(getattr(curve, of) for curve in study.curves if curve.varied.kind in kinds)

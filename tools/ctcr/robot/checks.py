@@ -156,7 +156,7 @@ def _missing_of_tubes(tubes: list[dict], weighed: bool) -> list[FieldPath]:
 
 
 def _of_field(kind: type[Section], error: dict[str, Any]) -> Fault:
-    """What pydantic found in a field of a section or of those below it, and what the field needs."""
+    """A fault that pydantic found in a section or below it, with the values that the field accepts."""
     path, is_unknown = path_of(error)
     section, field = kind.owner(path)
     if is_unknown:

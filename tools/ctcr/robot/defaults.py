@@ -1,4 +1,4 @@
-"""What holds of a robot where its file does not say it: `ctcr init` writes the same numbers into a new file."""
+"""Values that hold where a robot file states none; `ctcr init` writes the same numbers into a new file."""
 
 from typing import Any
 

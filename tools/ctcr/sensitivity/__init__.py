@@ -1,1 +1,1 @@
-"""What wrong parameters do to the predicted tip and to the tracking error, and which of them deserve calibration."""
+"""Influence of wrong parameters on the predicted tip and on the tracking error: which of them deserve calibration."""

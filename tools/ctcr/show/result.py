@@ -56,7 +56,7 @@ class Shown:
 
 
 class Result(Shown):
-    """What a comparison or a fit found. A subclass names the module of its page and its picture."""
+    """The result of a comparison or a fit. A subclass names the module of its page and its picture."""
 
     PAGE: ClassVar[str] = ""  # page(result) is a function of this module below ctcr
     PICTURE: ClassVar[tuple[str, str, float, float]]  # a module, its function, width and height [in]

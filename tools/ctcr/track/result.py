@@ -1,4 +1,4 @@
-"""What became of a scenario: each run with its errors and its verdict, and the numbers of each weight."""
+"""The result of a scenario: each run with its errors and its verdict, and the numbers of each weight."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -137,7 +137,7 @@ def run_all(
 
 
 def _remedy(scenario: Scenario) -> str:
-    """What helps where the start of the path is not reached."""
+    """Advice where the robot does not reach the start of the path."""
     if scenario.obstacle:
         centre = np.array(scenario.obstacle.centre_mm)
         left = np.linalg.norm(1e3 * scenario.trajectory.points[0] - centre) - scenario.obstacle.radius_mm

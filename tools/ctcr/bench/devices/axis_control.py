@@ -23,7 +23,7 @@ _fault = partial(DeviceFault, "joints")
 
 @dataclass(frozen=True)
 class AxisSettings:
-    """What the control knows of the joints (2N,): translations [m] first, then rotations [rad]."""
+    """Limits and gains of the joints (2N,): translations [m] first, then rotations [rad]."""
 
     speeds: Array  # highest [1/s]
     ramp_s: float  # to the highest speed

@@ -51,7 +51,7 @@ class JointLimits:
         return self._text(over[0], np.asarray(joints, float)) if len(over) else None
 
     def _text(self, limit: int, joints: Array) -> str:
-        """What the violated limit, an index of `excess`, demands of the joints."""
+        """Names the violated limit, an index of `excess`, with the present and the allowed values."""
         n = len(self.length)
         kind, tube = divmod(int(limit), n)
         i, beta, gap = tube + 1, 1e3 * joints[:n], 1e3 * self.excess(joints)[limit]

@@ -55,7 +55,7 @@ class VelocityMove:
         return self._left <= 0 and not self._speeds.any()
 
     def advance(self, dt: float) -> tuple[Array, Array]:
-        """As StraightMove.advance."""
+        """Like StraightMove.advance."""
         self._joints, self._speeds = self._after(dt)
         self._left -= dt
         return self._joints, self._speeds

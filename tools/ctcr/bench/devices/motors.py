@@ -98,7 +98,7 @@ class Motors(ProcessClient):
         self._answer(ANSWER_S, (self._number, name, arguments))
 
     def _answer(self, seconds: float, request: tuple | None = None):
-        """What the process answers to a request, or sends by itself."""
+        """The answer of the process to a request, or a message that it sends by itself."""
         try:
             if request:
                 self._pipe.send(request)

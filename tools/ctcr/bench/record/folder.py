@@ -138,7 +138,7 @@ def _interruptible() -> Iterator[None]:
 
 
 def about_of(folder: Path) -> dict[str, Any]:
-    """What the `session.json` of a recording says. Raises InputError where the folder holds none."""
+    """The content of the `session.json` of a recording. Raises InputError where the folder holds none."""
     try:
         about = json.loads(_read(folder / ABOUT))
         dict(about["settings"]), list(about["sittings"])

@@ -85,7 +85,7 @@ class RowFile:
         self.groups += 1
 
     def sync(self) -> None:
-        """What was appended is on the disk when it returns. Raises InputError."""
+        """Writes all appended rows to the disk before it returns. Raises InputError."""
         with file_faults(self.path, "write"):
             os.fsync(self._file)
 

@@ -1,1 +1,1 @@
-"""What devices and simulators share: their protocols, the folder where their processes meet, priorities."""
+"""Shared by devices and simulators: their protocols, the folder where their processes meet, priorities."""

@@ -70,7 +70,7 @@ class AuroraDevice:
         self.reset()
 
     def reset(self) -> None:
-        """As after power on, and after a break."""
+        """Returns to the state after power on, as a serial break does."""
         self.initialised = self.tracking = False
         self.next_baud = ndi.RESET_BAUD
         ports = (

@@ -1,4 +1,4 @@
-"""What both simulators share: the loop that serves, and faults switched by the control socket or a scenario file."""
+"""Shared by both simulators: the loop that serves, and faults switched by the control socket or a scenario file."""
 
 import select
 import time
