@@ -10,7 +10,7 @@ from pathlib import Path
 
 ROW = re.compile(r"\| ((?:`[\w/]+`(?:, )?)+) \|")
 INCLUDE = re.compile(r'\s*#\s*include\s*[<"](?:\.\./)*(?:ctcr/)?(\w+)/(?:\w+/)*\w+\.hpp[>"]')
-HEADER_TABLE = re.compile(r"`(\w+)`[^`\n]*:\n\n\| header \|.*\n\|[-|]+\|\n((?:\|.*\n)+)")
+HEADER_TABLE = re.compile(r"\nIn `(\w+)`.*:\n\n\|.*\| its one idea \|\n\|[-|]+\|\n((?:\|.*\n)+)")
 
 
 def rooms_of(readme: Path, heading: str) -> dict[str, int]:
@@ -48,8 +48,9 @@ def header_problems(include: Path) -> list[str]:
             if match and match[1] in layers and not may_see(layers, own, match[1]):
                 found.append(f"{header}:{number}: layer '{own}' must not include layer '{match[1]}'")
     for match in HEADER_TABLE.finditer(readme.read_text(encoding="utf-8")):
-        named = {name for row in match[2].splitlines() for name in re.findall(r"`(\w+\.hpp)`", row.split("|")[1])}
-        there = {header.name for header in (root / match[1]).glob("*.hpp")}
+        rows = (row.rsplit("|", 2)[0] for row in match[2].splitlines())
+        named = {name for row in rows for name in re.findall(r"`(\w+\.hpp)`", row)}
+        there = {header.name for header in (root / match[1]).rglob("*.hpp")}
         found += [f"{readme}:1: '{match[1]}/{name}' is missing in its table" for name in sorted(there - named)]
         found += [f"{readme}:1: '{match[1]}/{name}' does not exist" for name in sorted(named - there)]
     return found

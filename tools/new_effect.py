@@ -24,7 +24,8 @@ inline constexpr EffectInfo info{
     .reference = "",
     .needs = {},  // order, time, orientation, loads, gravity
 };
-// Neutral values change nothing. Beyond the soft bounds hardly this physics; beyond the hard ones impossible.
+// Neutral values change nothing. Values beyond the soft bounds are hardly this physics; those beyond the hard bounds
+// are impossible.
 inline constexpr std::array parameters{
     EffectParameter{.name = "size",
                     .unit = "",

@@ -45,6 +45,13 @@ In `low`, from the outside in:
 | header | its one idea |
 |---|---|
 | `x.hpp`, `y.hpp` | beside `z.hpp` |
+
+In `left`, which has a room:
+
+| room | header | its one idea |
+|---|---|---|
+| room | `w.hpp` | beside `z.hpp` |
+| | `x.hpp` | |
 """
 
 
@@ -52,7 +59,7 @@ def library(root: Path, **headers: str) -> Path:
     """Headers in the layers low, left and right beside each other, and high; `headers` are texts by name: low__x."""
     plant(root, "ctcr/README.md", TABLES)
     plant(root, "ctcr/ctcr.hpp", "#include <ctcr/high/x.hpp>\n")
-    for name in ("low__x", "low__y", "left__x", "right__x", "high__x", *headers):
+    for name in ("low__x", "low__y", "left__x", "left__room__w", "right__x", "high__x", *headers):
         plant(root, f"ctcr/{name.replace('__', '/')}.hpp", headers.get(name, "#pragma once\n"))
     return root
 
@@ -71,7 +78,12 @@ def test_layers(tmp_path, own, seen, form):
 
 @pytest.mark.parametrize(
     ("planted", "found"),
-    [("shed__x", "layer 'shed' is missing"), ("low__new", "'low/new.hpp' is missing in its table"), ("high__new", "")],
+    [
+        ("shed__x", "layer 'shed' is missing"),
+        ("low__new", "'low/new.hpp' is missing in its table"),
+        ("left__room__new", "'left/new.hpp' is missing in its table"),
+        ("high__new", ""),
+    ],
 )
 def test_tables_of_layers(tmp_path, planted, found):
     """A folder without a row, and a header without one in the table of its folder, if it has a table."""
@@ -129,13 +141,15 @@ def test_room_without_row(tmp_path):
 
 # Written in pieces, so that this file passes the check itself.
 @pytest.mark.parametrize("line", ["/" + "home/ann/data", '"/' + 'tmp/x"', "pypi" + ".org", "see issue " + "#3"])
-def test_forbidden_text_is_found_with_its_line(tmp_path, line):
+def test_forbidden_text(tmp_path, line):
+    """Forbidden text is found with its line."""
     file = plant(tmp_path, "include/ctcr/x.hpp", f"#pragma once\n// {line}\n")
     assert [problem.rsplit(":", 1)[0] for problem in text.problems(tmp_path)] == [f"{file}:2"]
 
 
 @pytest.mark.parametrize("line", ["include/" + "home/x", "${prefix}/" + "tmp/x", "~/" + "work/x", "tissue 3", "1/home"])
-def test_harmless_text_passes(tmp_path, line):
+def test_harmless_text(tmp_path, line):
+    """Text that only resembles forbidden text passes."""
     plant(tmp_path, "tools/x.py", f"# {line}\n")
     assert text.problems(tmp_path) == []
 
