@@ -52,13 +52,16 @@ REVERSAL = 2e-4  # part of its whole range by which a joint that reverses comes 
 CLEAR_DELAY = 0.2  # fraction of the squared hysteresis that a delay must explain to be mentioned
 
 REST = 20e-6  # [m] of scaled joint distance, within which rows are one stop: above the noise of encoders
+STILL = 1e-6  # [m] of scaled joint distance, up to which a row stands where the one before it stood
+SAME_VISIT_DECIMALS = 4  # of joint space [rad] in which visits of two runs agree
+PROBES = 500  # readings by which a typical number or distance of neighbours is estimated: to save time
 PASS_APART = 0.25  # usual joint steps by which two passes through the same joints may miss each other,
 PASS_APART_BOUNDS = (0.1e-3, 0.5e-3)  # [m] ... but no less than the first and no more than the second
 LONGEST_LINK = 3.0  # usual joint steps over which errors are interpolated at most,
 LONGEST_LINK_TURN = 0.2  # ... and part of the lever arm: about 0.2 rad of rotation
 MOST_NEIGHBOURS = 300_000  # pairs of visits that are looked up: their RMS is known to 0.2 %; time and memory
-FEWEST_PAIRS = 5  # of visits from the same direction, below which the noise floor is taken from elsewhere
-FEWEST_FREEDOM = 10  # degrees of freedom of the scatter at rest, from which it serves as the noise floor
+FEWEST_PAIRS = 5  # of visits from the same direction, below which the sensor jitter is taken from elsewhere
+FEWEST_FREEDOM = 10  # degrees of freedom of the scatter at rest, from which it serves as the sensor jitter
 NOTABLE = 1.5  # difference of visits over the stated jitter, below which it is not reported
 OUTLYING_PAIR = 1e-5  # probability by noise below which the difference of two visits is an outlier
 DENSE_STREAM = 20  # pairs of visits a segment, beyond which neighbours are not independent
@@ -79,7 +82,7 @@ MAIN_AXIS = 0.7  # fraction of the squared fit, from which one axis is named
 
 GROSS_TURN_DEG = 10.0  # [deg] of a tracker frame that is fitted before anything else is examined,
 GROSS_TURN_EXPLAINED = 0.3  # ... if it explains this fraction of the squared error that the shift leaves
-OUTLYING_RUN = 5.0  # robust standard deviations beyond which the mean error of a run may be an outlier,
+OUTLYING_RUN = 5.0  # robust RMS of all runs beyond which the mean error of a run may be an outlier,
 BEYOND_MOTION = 2.0  # ... and is, where it differs from errors at near joints by this many times their distance
 
 # ---- Noise of the tracker
@@ -91,8 +94,9 @@ FIELD_PARTS = (1.0, 0.3, 0.1, 0.0)  # parts of the stated field error that are t
 # ---- Joint fit
 
 # A table of a part of the readings leaves rows out where the joints move straight on.
-PATH_STRAIGHT = {"alpha": 1.5e-3, "beta": 2e-6}  # [rad], [m] by which they may miss that motion: friction slips at 5e-3
-PATH_STEP = {"alpha": 0.035, "beta": 1e-3}  # [rad], [m] over which the torsion of rubbing tubes changes linearly
+# [rad], [m] by which they may miss that motion, as in friction/path_nodes.hpp of the library: friction slips at 5e-3
+PATH_STRAIGHT = {"alpha": 1.5e-3, "beta": 2e-6}
+PATH_STEP = {"alpha": 0.035, "beta": 1e-3}  # [rad], [m] over which friction changes the torsion of tubes linearly
 FEW_ROWS = 300  # rows of a first fit where there are twice as many: enough to find the basin of every parameter
 FEW_PART = 0.1  # of very many rows, fitted before all of them: its steps cost a tenth
 TOLERANCE = 0.02  # [log evidence] of a converged fit: far below what decides anything
@@ -134,6 +138,7 @@ NEARLY_EXPLAINED = 1.5  # reduced chi-square up to which the smooth field error 
 CROSS_VALIDATION_ROWS = 5000  # rows that judge noises, held-out errors and halves at most: to save time
 HALVES_ROWS = 400  # rows at which the models of two halves are compared
 HALVES_DRAWS, HALVES_SEED = 24, 1  # of the posterior: the RMS that noise gives is then known to 15 %
+HALVES_AGREE = 1.5  # RMS difference of two halves over that by noise, up to which noise explains it
 
 # ---- Diagnosis: evidence for an effect
 
@@ -228,9 +233,8 @@ PLAN_STOPS = 4  # of a run on the way out; it returns through the same, so that 
 
 SENSOR_JUMP = 0.01, 0.2  # [m], [rad] from where the file has the sensor, beyond which no mounting error lies
 SENSOR_ROWS = 2000  # readings, evenly spread, of which its pose is estimated: to save time
-CONVENTION_ROWS = (
-    240  # readings on which hypotheses are compared, spread over all runs: a prediction takes microseconds
-)
+CONVENTION_ROWS = 240  # readings that compare hypotheses, spread over all runs: a prediction takes microseconds
+ALIGNMENT_ROUNDS = 3  # of weights in a robust rigid motion: it is only a start
 CONVENTION_WIDER = 5.0  # factor on the stated standard deviations: data sheets err by more than they say
 CONVENTION_ANYWHERE = 1.0  # [m] standard deviation and bound of a position of which nothing is known
 CONVENTION_ITERATIONS = 10  # of the fit of a hypothesis

@@ -17,8 +17,8 @@ class PathNodes {
 
   // Largest distance between nodes [rad], [m].
   static constexpr double rotation = 0.0175, translation = 3.5e-4;
-  // By which a motion may bend and still be straight [rad], [m]: a slide by the radius of a tube changes friction as much as
-  // a turn of 1 rad.
+  // By which a motion may bend and still be straight [rad], [m], as in settings.PATH_STRAIGHT of the Python tools: a slide
+  // by the radius of a tube changes friction as much as a turn of 1 rad.
   static constexpr double bent = 1.5e-3, slid = 2e-6;
   // By which a torsion may bend and still be linear [rad].
   static constexpr double twisted = 5e-3;

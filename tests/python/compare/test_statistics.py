@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from compare_bench import bench, stop_and_go, stream
 from ctcr import settings
+from ctcr.arrays import robust_rms
 from ctcr.compare import crossvalidation as cv
 from ctcr.compare.dependence import local_frames
 from ctcr.compare.sample import take_sample
@@ -115,3 +116,12 @@ def test_rigid_motion(seed):
     found_turn, found_shift = rigid_motion(source, source @ turn.T + shift)
     np.testing.assert_allclose(found_turn, turn, atol=1e-12)
     np.testing.assert_allclose(found_shift, shift, atol=1e-12)
+
+
+@pytest.mark.parametrize("axes", [1, 3])
+def test_robust_rms(axes):
+    """The RMS length of normal vectors, which a hundredth of gross outliers changes by 2 % at most."""
+    lengths = np.linalg.norm(np.random.default_rng(axes).normal(0, 0.3, (200_000, axes)), axis=1)
+    assert robust_rms(lengths, axes) == pytest.approx(0.3 * axes**0.5, rel=5e-3)
+    lengths[::100] = 1e3
+    assert robust_rms(lengths, axes) == pytest.approx(0.3 * axes**0.5, rel=2e-2)

@@ -5,7 +5,7 @@ import pytest
 from compare_bench import JITTER_MM, bench, stop_and_go, stream
 from ctcr import settings
 from ctcr.compare import compare
-from ctcr.compare.noise import noise_floor
+from ctcr.compare.noise import sensor_jitter
 from ctcr.compare.sample import follow, take_sample
 from ctcr.compare.visits import MIXED, OPPOSITE, SAME, find_revisits, find_stops
 
@@ -52,14 +52,14 @@ def test_noise_in_a_stream():
     assert d.rms_mm == pytest.approx(JITTER_MM * np.sqrt(3 * factor), rel=0.1)
 
 
-def test_noise_floor():
+def test_sensor_jitter():
     """About 95 in 100 floors lie within two standard errors of the truth; with 12 runs the errors are Student's t."""
     inside, floors = 0, []
     for seed in range(60):
         random = np.random.default_rng(seed)
         sample = take_sample(*bench(random, stop_and_go(random, runs=12, stops=5)))
         stops = find_stops(sample)
-        noise = noise_floor(stops, find_revisits(stops, sample.lever), stated_mm=1.0)
+        noise = sensor_jitter(stops, find_revisits(stops, sample.lever), stated_mm=1.0)
         assert (noise.source, noise.pairs) == ("revisits", 12)
         inside += abs(noise.axis_mm - JITTER_MM) < 2.2 * noise.uncertainty_mm
         floors.append(noise.axis_mm**2)

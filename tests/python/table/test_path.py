@@ -1,6 +1,8 @@
 """Rows without which the path would be another."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -54,3 +56,10 @@ def test_runs_and_loads():
     assert kept[[119, 120, 239, 240]].all()
     crooked = np.random.default_rng(8).normal(0, 0.01, table.alpha.shape)
     assert with_path(replace(table, alpha=table.alpha + crooked), np.zeros(len(table), bool)).mean() > 0.95
+
+
+def test_straight_as_in_the_library():
+    """Where friction takes a motion for straight, so does the choice of rows."""
+    header = Path(__file__).parents[3] / "include/ctcr/friction/path_nodes.hpp"
+    bent, slid = re.search(r"double bent = (\S+), slid = (\S+);", header.read_text(encoding="utf-8")).groups()
+    assert settings.PATH_STRAIGHT == {"alpha": float(bent), "beta": float(slid)}

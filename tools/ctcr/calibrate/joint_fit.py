@@ -78,7 +78,7 @@ class Calibration(Result):
 
     @cached_property
     def robot(self) -> Robot:
-        """With the fitted values and an entry of the ledger: what `save` writes."""
+        """The robot with the fitted values and an entry of the ledger, as `save` writes it."""
         changes, entry, effects = _change(self)
         return ledger.changed(self.before, changes, entry, effects=effects)
 
@@ -232,7 +232,7 @@ def calibrate(
         fitted=fields.fitted(fit),
         stages=[*stages, stage_of("calibrated", fit.residual)],
         held_out=held_out,
-        floor=Stage("noise floor", fit.expected_mm(), fit.expected_deg()),
+        floor=Stage("expected error", fit.expected_mm(), fit.expected_deg()),
         floors=floor,
         halves=compare_halves(robot, table, *pair, both.kind) if pair else None,
         notices=[
@@ -299,5 +299,5 @@ def _held_out(judged: list[tuple[Fit, Mask]], kind: str) -> HeldOut:
     expected = np.concatenate([fit.expected_square[rows] for fit, rows in judged])
     known = np.isfinite(residual[:, [0, 3]])
     floor = [rms(np.sqrt(expected[:, [i]]), known[:, i]) for i in range(2)]
-    floor = Stage("noise floor", 1e3 * floor[0], float(np.degrees(floor[1])))
+    floor = Stage("expected error", 1e3 * floor[0], float(np.degrees(floor[1])))
     return HeldOut(kind, len(judged), int(known[:, 0].sum()), stage_of("held out", residual), floor)

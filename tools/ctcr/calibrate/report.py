@@ -4,6 +4,7 @@ from math import isfinite
 
 import numpy as np
 
+from ctcr import settings
 from ctcr.calibrate import figures
 from ctcr.calibrate.joint_fit import Calibration, Stage
 from ctcr.show import html_page, output
@@ -25,7 +26,7 @@ PARAMETER_COLUMNS = {
     "robot file": "the value before, and its standard deviation by the uncertainty of the robot file",
     "fitted": "the value found, and its standard deviation after the fit",
     "moved": "fitted less robot file, in standard deviations of the robot file's value",
-    "sd left": "standard deviation after the fit, of that before: near 100 % the data say nothing",
+    "sd left": "standard deviation after the fit, of that before: near 100 % the data do not determine it",
     "note": "",
 }
 SHOWN = 12
@@ -133,7 +134,7 @@ def _fit(c: Calibration) -> list[str]:
     gain = "From the robot file's values to the expected error. The error that counts is the one of held-out readings."
     values = (
         "Fitted values and their standard deviations, in standard deviations of the robot file's values (grey: one and "
-        "two of them). Red: further than two, implausible or at a bound. Pale: the data say nothing."
+        "two of them). Red: further than two, implausible or at a bound. Pale: not determined."
     )
     together = "Dark red and dark blue: the data determine only the sum or the difference of the two."
     return [
@@ -152,7 +153,7 @@ def _halves(c: Calibration) -> str:
     beyond = mm(float(np.sqrt(max(h.rms_mm**2 - h.noise_mm**2, 0.0))))
     verdict = (
         "so noise explains it: more readings of the same kind would help"
-        if h.rms_mm <= 1.5 * h.noise_mm
+        if h.rms_mm <= settings.HALVES_AGREE * h.noise_mm
         else f"so {beyond} of it is error of the model: it fits one part of the data at the cost of another"
     )
     text = (

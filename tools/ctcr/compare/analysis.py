@@ -12,7 +12,7 @@ from ctcr.arrays import Array, Integers
 from ctcr.compare.covariates import fixed_names
 from ctcr.compare.crossvalidation import group_means, group_quantiles, make_folds, split
 from ctcr.compare.dependence import Ranking, rank
-from ctcr.compare.noise import DirectionDifference, NoiseFloor, direction_difference, noise_floor
+from ctcr.compare.noise import DirectionDifference, SensorJitter, direction_difference, sensor_jitter
 from ctcr.compare.offsets import FrameTurn, RunOffsets, Shift, find_run_offsets, find_shift, find_turn
 from ctcr.compare.same_joints import PairOfRuns, pairs_of_runs
 from ctcr.compare.sample import Sample, take_sample
@@ -68,7 +68,7 @@ class Comparison(Result):
     angle_deg: Spread | None  # None where no orientation was measured
     angle_kind: str  # "orientation", or "tip direction" where the sensor's rotation is unknown
     runs: list[RunErrors]
-    noise: NoiseFloor
+    noise: SensorJitter
     direction: DirectionDifference | None
     shift: Shift | None  # None when there are too few readings to judge
     turn: FrameTurn | None  # where gross, everything but the errors themselves is computed with the frame fitted
@@ -185,7 +185,7 @@ def compare(
     stops = find_stops(sample)
     revisits = find_revisits(stops, sample.lever)
     jitter_mm = robot.tracker.jitter_mm
-    noise = noise_floor(stops, revisits, nan if jitter_mm is None else jitter_mm)
+    noise = sensor_jitter(stops, revisits, nan if jitter_mm is None else jitter_mm)
     step, velocity = (motion[stops.first] @ sample.rotation.T for motion in (sample.tip_step, sample.tip_velocity))
     direction = direction_difference(stops, revisits, noise, step, velocity)
     as_taken, visits, pairs = sample, stops, revisits

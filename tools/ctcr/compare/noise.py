@@ -7,14 +7,14 @@ import scipy  # not scipy.stats, which takes half a second: scipy loads it when 
 from scipy.special import chdtri, ndtr
 
 from ctcr import settings
-from ctcr.arrays import Array, Integers
+from ctcr.arrays import Array, Integers, robust_rms
 from ctcr.compare.crossvalidation import block_error, group_quantiles, segments
 from ctcr.compare.visits import OPPOSITE, SAME, Revisits, Stops
 
 
 @dataclass(frozen=True)
-class NoiseFloor:
-    """Scatter of one reading. Axis values are standard deviations per axis, rms is the 3-D length."""
+class SensorJitter:
+    """The scatter of one reading. Axis values are standard deviations per axis, rms is the 3-D length."""
 
     source: str  # "revisits", "rest" or "stated"
     axis_mm: float
@@ -43,14 +43,14 @@ class DirectionDifference:
     quiet_rms_mm: float  # difference of two visits that this jitter or scatter gives
     same_rms_mm: float  # difference of same-direction visits, NaN without
     miss_mm: float  # usual joint distance between the matched visits
-    along_share: float  # share of the squared difference along the tip's motion, NaN if unknown
+    along_share: float  # fraction of the squared difference along the tip's motion, NaN if unknown
     delay_s: float  # least-squares delay of the readings behind the joints; NaN without a time axis
     delay_uncertainty_s: float
     rms_without_delay_mm: float  # RMS of the residual once that delay is removed
     maximum_without_delay_mm: float
 
 
-def noise_floor(stops: Stops, revisits: Revisits, stated_mm: float) -> NoiseFloor:
+def sensor_jitter(stops: Stops, revisits: Revisits, stated_mm: float) -> SensorJitter:
     """Scatter of one reading from same-direction revisits inside a run, else from rests, else as stated."""
     pairs = revisits.inside(SAME)
     resting = np.isfinite(stops.dwell_variance)
@@ -65,7 +65,7 @@ def noise_floor(stops: Stops, revisits: Revisits, stated_mm: float) -> NoiseFloo
         source, axis, error = "rest", rest_axis, rest_axis / np.sqrt(6 * freedom.sum())
     else:
         source, axis, error = "stated", stated_mm * 1e-3, np.nan
-    return NoiseFloor(
+    return SensorJitter(
         source=source,
         axis_mm=axis * 1e3,
         uncertainty_mm=float(error) * 1e3,
@@ -78,7 +78,7 @@ def noise_floor(stops: Stops, revisits: Revisits, stated_mm: float) -> NoiseFloo
 
 
 def direction_difference(
-    stops: Stops, revisits: Revisits, floor: NoiseFloor, tip_step: Array, tip_velocity: Array
+    stops: Stops, revisits: Revisits, floor: SensorJitter, tip_step: Array, tip_velocity: Array
 ) -> DirectionDifference | None:
     """DirectionDifference of the opposite visits inside a run, or None when there are none.
 
@@ -114,7 +114,7 @@ def direction_difference(
         rms_mm=rms * 1e3,
         uncertainty_mm=block_error(square, blocks) / (2 * max(rms, 1e-12)) * 1e3,
         maximum_mm=float(np.sqrt(square.max())) * 1e3,
-        typical_rms_mm=float(np.sqrt(np.median(square) * 3 / chdtri(3, 0.5))) * 1e3,
+        typical_rms_mm=robust_rms(np.sqrt(square), 3) * 1e3,
         outliers=outliers,
         moved=_moved(stops, opposite),
         floor_mm=rms / 2 * 1e3,

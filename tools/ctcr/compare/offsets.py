@@ -7,9 +7,9 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from ctcr import settings
-from ctcr.arrays import Array, Integers, Mask
+from ctcr.arrays import Array, Integers, Mask, robust_rms
 from ctcr.compare.crossvalidation import Folds, Regression, chance, group_means, segments
-from ctcr.compare.noise import NoiseFloor, beyond, p_larger, rms_mm
+from ctcr.compare.noise import SensorJitter, beyond, p_larger, rms_mm
 from ctcr.compare.sample import Sample
 from ctcr.compare.visits import SAME, Revisits, Stops
 from ctcr.frames import rigid_motion
@@ -86,7 +86,7 @@ def find_turn(predicted: Array, measured: Array, folds: Folds) -> FrameTurn:
     return FrameTurn(float(np.degrees(angle)), tuple(axis), rms_mm(before), rms_mm(after))
 
 
-def find_run_offsets(sample: Sample, stops: Stops, revisits: Revisits, noise: NoiseFloor) -> RunOffsets:
+def find_run_offsets(sample: Sample, stops: Stops, revisits: Revisits, noise: SensorJitter) -> RunOffsets:
     """Compare visits of the same joints in different runs with visits inside one run, or where there are too few, those
     from the same direction with the noise.
 
@@ -104,8 +104,7 @@ def find_run_offsets(sample: Sample, stops: Stops, revisits: Revisits, noise: No
     means = group_means(error, label)
     around = np.sum((error - error.mean(axis=0)) ** 2)
     distance = np.linalg.norm(means - np.median(means, axis=0), axis=1)
-    # the median length of a 3-D Gaussian vector is 1.54 standard deviations
-    distant = distance > settings.OUTLYING_RUN * np.sqrt(3) * max(np.median(distance) / 1.54, 1e-12)
+    distant = distance > settings.OUTLYING_RUN * max(robust_rms(distance, 3), 1e-12)
     distant &= len(names) >= settings.FEWEST_BLOCKS
     far = _far_runs(sample, label, distant)
     return RunOffsets(
@@ -132,7 +131,8 @@ def _far_runs(sample: Sample, label: Integers, distant: Mask) -> Mask:
     far, near, error = distant.copy(), ~distant[label], sample.error
     tree = cKDTree(sample.motion.scaled[near])
     for run in np.flatnonzero(far):
-        mine = np.flatnonzero(label == run)[:: max(1, int(np.sum(label == run)) // 500)]
+        mine = np.flatnonzero(label == run)
+        mine = mine[:: max(1, len(mine) // settings.PROBES)]
         gap, index = tree.query(sample.motion.scaled[mine])
         change = np.linalg.norm(error[mine] - error[near][index], axis=1)
         far[run] = np.median(change) > settings.BEYOND_MOTION * np.median(gap)

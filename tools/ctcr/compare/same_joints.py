@@ -11,8 +11,6 @@ from ctcr.compare.crossvalidation import group_means
 from ctcr.frames import rigid_motion
 from ctcr.table.measurements import Measurements
 
-DECIMALS = 4  # of joint space [rad] in which the same joints agree
-
 
 @dataclass(frozen=True)
 class PairOfRuns:
@@ -33,7 +31,8 @@ def pairs_of_runs(table: Measurements) -> list[PairOfRuns]:
     located &= np.isin(table.run, runs[evenly(len(runs), settings.CONVENTION_MOST_RUNS)])
     if not located.any():
         return []
-    _, joint = np.unique(np.round(table.joint_space[located], DECIMALS), axis=0, return_inverse=True)
+    joints = np.round(table.joint_space[located], settings.SAME_VISIT_DECIMALS)
+    _, joint = np.unique(joints, axis=0, return_inverse=True)
     visits, label = np.unique(np.column_stack([table.run[located], joint]), axis=0, return_inverse=True)
     tips = 1e3 * group_means(table.positions[located], label)
     again = np.bincount(visits[:, 1])[visits[:, 1]] > 1

@@ -73,7 +73,7 @@ def find_stops(sample: Sample) -> Stops:
     scaled, run, error = sample.motion.scaled, sample.run, sample.error
     step, last = np.diff(scaled, axis=0), -1
     linked = np.append(False, run[1:] == run[:-1])
-    rests = linked & np.append(False, np.linalg.norm(step, axis=1) <= 0.05 * settings.REST)
+    rests = linked & np.append(False, np.linalg.norm(step, axis=1) <= settings.STILL)
     near = np.append(False, np.abs(step).max(axis=1, initial=0.0) <= settings.REST)
     first: list[int] = []
     for i in np.flatnonzero(~rests).tolist():
@@ -129,7 +129,7 @@ def find_revisits(stops: Stops, lever: float) -> Revisits:
 def _neighbours(scaled: Array, reach: float) -> tuple[Integers, Integers]:
     """Index pairs (visit, neighbour) within reach, the visit itself included; thinned when there are too many."""
     tree = cKDTree(scaled)
-    probe = evenly(len(scaled), 500)
+    probe = evenly(len(scaled), settings.PROBES)
     typical = np.mean(tree.query_ball_point(scaled[probe], reach, return_length=True))
     queries = scattered(len(scaled), int(settings.MOST_NEIGHBOURS / typical))
     found = tree.query_ball_point(scaled[queries], reach)

@@ -2,10 +2,9 @@
 
 import numpy as np
 
+from ctcr import settings
 from ctcr.arrays import Array
 from ctcr.frames import rigid_motion
-
-ROUNDS = 3  # of weights: the motion is only a start
 
 
 def aligned(source: Array, target: Array) -> tuple[Array, Array, Array]:
@@ -18,7 +17,7 @@ def aligned(source: Array, target: Array) -> tuple[Array, Array, Array]:
     if known.sum() < 3:
         return rotation, shift, distance
     a, b, weight = source[known], target[known], np.ones(known.sum())
-    for _ in range(ROUNDS):
+    for _ in range(settings.ALIGNMENT_ROUNDS):
         rotation, shift = rigid_motion(a, b, weight)
         distance[known] = np.linalg.norm(b - a @ rotation.T - shift, axis=1)
         usual = np.median(distance[known])

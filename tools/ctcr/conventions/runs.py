@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ctcr import settings
-from ctcr.arrays import Integers
+from ctcr.arrays import Integers, robust_rms
 from ctcr.conventions import orientation, tips
 from ctcr.conventions.alignment import aligned
 from ctcr.conventions.calibrated import Calibrated, calibrated, dearer, own_values
@@ -32,8 +32,8 @@ def unlike(fit: Calibrated, readings: Measurements) -> tuple[Finding, Change] | 
 
 
 def _minorities(fit: Calibrated, readings: Measurements) -> Iterator[Integers]:
-    """Runs that may be unlike the others, fewer than these: the one farthest off, all that are far off, and those in
-    which a home or a curvature would have to be another one."""
+    """Minorities of runs that may be unlike the others: the run of the largest error, the runs of large errors, and the
+    runs that ask for another home or curvature."""
     runs, index = np.unique(readings.run, return_inverse=True)
     error = np.array([fit.log_error[index == k].mean() for k in range(len(runs))])
     yield runs[[np.argmax(error)]]
@@ -74,7 +74,7 @@ def _explained(fit: Calibrated, readings: Measurements, some: Integers) -> tuple
     if best.offset:
         name, tube, value = best.offset
         scanned = [_scan(like, rows, name, tube) for rows in others]
-        if abs(value) < settings.OUTLYING_RUN * 1.48 * np.median(np.abs(scanned)):
+        if abs(value) < settings.OUTLYING_RUN * robust_rms(np.abs(scanned), 1):
             return None  # the others would take offsets too: something else acts
         stated = 0.01 * like.robot.uncertainty.of("curvature_percent", tube)
         if name == "curvature" and abs(value) < settings.MOVED_FAR * stated:
@@ -113,7 +113,7 @@ def _differences(like: Calibrated, mine: Measurements) -> Iterator[tuple[Hypothe
 
 
 def _exchanged() -> Iterator[Hypothesis]:
-    """Two axes of the tracker, which a mirror and another frame would explain if all runs had them so."""
+    """Hypotheses that two axes of the tracker are exchanged; if so in all runs, a mirror would explain it."""
     for a, b in ((0, 1), (1, 2), (0, 2)):
         order = np.arange(3)
         order[[a, b]] = b, a

@@ -40,10 +40,8 @@ def late_by_a_row(fit: Calibrated, readings: Measurements) -> tuple[Finding, Cha
         located = np.flatnonzero(np.isfinite(moved.positions).all(axis=1))
         there = calibrated(fit.robot, moved.rows(located[evenly(len(located), settings.CONVENTION_ROWS)]))
         own, before = _errors(there, readings, after)
-        tested, late = (
-            late,
-            [int(run) for run in np.unique(runs) if _is_late(own.at(runs == run), before.at(runs == run))],
-        )
+        tested = late
+        late = [int(run) for run in np.unique(runs) if _is_late(own.at(runs == run), before.at(runs == run))]
         if late == tested:
             break
     rows = np.isin(runs, late)
@@ -55,7 +53,7 @@ def late_by_a_row(fit: Calibrated, readings: Measurements) -> tuple[Finding, Cha
 
 
 def _is_late(own: Calibrated, before: Calibrated) -> bool:
-    """Whether readings fit the joints of the rows before them and hardly leave an error, but do not fit their own."""
+    """Whether readings fit the joints of the rows before them, with hardly any error, and do not fit their own."""
     return before.beats(own) and np.max(before.left_of(own)) < settings.CONVENTION_CONSTANT
 
 

@@ -30,8 +30,8 @@ def cross_validated(engine: Engine, fit: joint.Fit, noise: Any = None) -> Array:
     fit."""
     group = folds.groups(engine.measurements)
     plain, squares = fit.weights[:, 0] > settings.OUTLIER_WEIGHT, []
-    for fold in range(settings.FOLDS):
-        out = engine.rows & (group % settings.FOLDS == fold)
+    for fold in folds.each_fold(group):
+        out = engine.rows & fold
         if not out.any():
             continue
         inflation = fit.inflation if noise is None else None  # another noise has its own

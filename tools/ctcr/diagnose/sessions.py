@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from ctcr import settings
-from ctcr.arrays import Array
+from ctcr.arrays import Array, robust_rms
 from ctcr.audit import sensor_pose
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
@@ -19,7 +19,7 @@ from ctcr.diagnose.round import Judged, parameters_of
 from ctcr.diagnose.selection import Selection
 from ctcr.diagnose.varying_coefficients import label_of
 from ctcr.errors import InputError
-from ctcr.fit import joint
+from ctcr.fit import folds, joint
 from ctcr.fit.result import Fit, rms
 from ctcr.fit.sessions import as_sessions, part_of_runs, sessions_at, some_runs
 from ctcr.model import parameters, user_recording
@@ -34,7 +34,7 @@ def of_runs(robot: Robot, readings: Measurements, asked: bool | None = None) -> 
     """The readings without what each run has of its own, and sentences on that; the same readings, where the runs are
     one session, or nobody asked and no fit is possible that could tell.
 
-    asked    whether each run has a frame of its own; None: where the readings say so
+    asked    whether each run has a frame of its own; None: where the readings support it
     Raises InputError where a frame for each run was asked for, and no fit is possible.
     """
     try:
@@ -197,8 +197,7 @@ def _held_out(engine: Engine) -> float:
     measured = engine.measurements.measured
     rows = measured if np.sum(measured) < settings.CROSS_VALIDATION_ROWS else engine.rows
     square = np.full(len(run), np.nan)
-    for fold in range(settings.FOLDS):
-        out = run % settings.FOLDS == fold
+    for out in folds.each_fold(run):
         if out.any() and (rows & ~out).any():
             fit = replace(engine, rows=rows & ~out).fit()
             square[out] = np.sum(fit.residual[out, :3] ** 2, axis=1)
@@ -214,7 +213,7 @@ def _rms_mm(robot: Robot, readings: Measurements) -> float:
 def _moved_alone(sessions: Sessions) -> list[str]:
     """A sentence on runs whose frame lies far from that of the others; none where there are no such runs."""
     far = np.linalg.norm(sessions.shift - np.median(sessions.shift, axis=0), axis=1)
-    odd = far > settings.OUTLYING_RUN * 1.48 * np.median(far)
+    odd = far > settings.OUTLYING_RUN * robust_rms(far, 3)
     if not odd.any():
         return []
     size = wording.mm(1e3 * far[odd].max())
@@ -230,7 +229,7 @@ def _not_shared(explained: Mapping[tuple[str, ...], float]) -> list[str]:
     of_tubes = [names[0].startswith("tubes.") for names in alike]
     asked = " or ".join(["changed"] * any(of_tubes) + ["homed anew"] * (not all(of_tubes)))
     return [
-        f"{wording.percent(best)} of what is left looks as if the runs did not share "
+        f"{wording.percent(best)} of the unexplained chi-square looks as if the runs did not share "
         f"{' or '.join(map(_named, alike))}. One robot file cannot hold that: were tubes {asked} between runs?"
     ]
 

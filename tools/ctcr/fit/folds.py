@@ -4,7 +4,7 @@ Rows are never split singly, because neighbours on a path share their error. Run
 runs, blocks of time do, or regions of joint space with every pass through them.
 """
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,6 +89,11 @@ def groups(measurements: Measurements) -> Integers:
         order = {run: i for i, run in enumerate(runs[np.argsort(first)])}
         return np.array([order.get(run, 0) for run in measurements.run])
     return np.maximum(np.cumsum(measured) - 1, 0) * settings.TIME_BLOCKS // max(np.sum(measured), 1)
+
+
+def each_fold(group: Integers) -> Iterator[Mask]:
+    """The rows (M,) of each fold of a cross-validation: one of every FOLDS groups (M,)."""
+    return (group % settings.FOLDS == fold for fold in range(settings.FOLDS))
 
 
 def held_out_rows(robot: Robot, measurements: Measurements, turn: int = 0, fitted: Collection[int] = ()) -> Mask:

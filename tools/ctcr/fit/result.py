@@ -87,7 +87,7 @@ class Fit:
     """Fitted parameters and their uncertainty. Arrays by parameter (n,) are in SI; by row (M, ..) over all rows.
 
     All attributes of the compiled fit (`_core.Identification`) are attributes of this one:
-    shift, ratio     (n,) (value - mean) / prior sd, and posterior over prior sd: 1 means that the readings say nothing;
+    shift, ratio     (n,) (value - mean) / prior sd, and posterior over prior sd: 1: the readings do not determine it;
                      the prior sd is the widened one
     directions       undetermined combinations: .text, .ratio, .coefficients in prior sd
     weights          (M, 2) robust weights of position and rotation: 1 plain, less for outliers, 0 not fitted
@@ -158,7 +158,7 @@ class Fit:
         return replace(self, core=core, model=None, positions=None)
 
     def _activate_all(self) -> None:
-        """Activates all rows but the excluded ones: those that were not fitted, too."""
+        """Activates all rows but the excluded ones, with those that were not fitted."""
         solved = np.ones(len(self.weights), bool)
         solved[self.excluded] = False
         self.model.activate(solved.tolist())
@@ -221,9 +221,6 @@ class Fit:
         """RMS length of the position residual of some rows (M,), all by default."""
         return 1e3 * rms(self.residual[:, :3], rows)
 
-    def rms_deg(self, rows: Mask | None = None) -> float:
-        return float(np.rad2deg(rms(self.residual[:, 3:], rows)))
-
     def nominal_rms_mm(self, rows: Mask | None = None) -> float:
         return 1e3 * rms(self.nominal_residual[:, :3], rows)
 
@@ -231,10 +228,11 @@ class Fit:
         """RMS position error to be expected of a right model: see `expected_square`."""
         return 1e3 * self._expected(0, rows)
 
-    def expected_deg(self, rows: Mask | None = None) -> float:
-        return float(np.rad2deg(self._expected(1, rows)))
+    def expected_deg(self) -> float:
+        """RMS rotation error to be expected of a right model."""
+        return float(np.rad2deg(self._expected(1)))
 
-    def _expected(self, kind: int, rows: Mask | None) -> float:
+    def _expected(self, kind: int, rows: Mask | None = None) -> float:
         known = np.isfinite(self.residual[:, 3 * kind]) & (True if rows is None else rows)
         return rms(np.sqrt(self.expected_square[:, [kind]]), known)
 

@@ -27,8 +27,8 @@ def with_path(measurements: Measurements, rows: Mask) -> Mask:
         off = np.where(kept, 0.0, np.max(np.abs(joints - between), axis=1))
         if not np.any(off > 1):
             return kept
-        # Of each stretch between kept rows, the row that is farthest off.
-        stretch = np.cumsum(kept)
-        order = np.lexsort((off, stretch))
-        farthest = order[np.append(np.diff(stretch[order]) > 0, True)]
+        # Keep the row of the largest deviation between each two kept rows.
+        segment = np.cumsum(kept)
+        order = np.lexsort((off, segment))
+        farthest = order[np.append(np.diff(segment[order]) > 0, True)]
         kept[farthest[off[farthest] > 1]] = True
