@@ -21,7 +21,7 @@ print(f"nominal    {fit.nominal_rms_mm(held_out):6.3f} mm RMS on the runs held o
 print(f"calibrated {fit.rms_mm(held_out):6.3f} mm, expected error {fit.expected_mm(held_out):.3f} mm")
 print(f"reduced chi-square {fit.reduced_chi_square:.2f}")
 
-# Values in the units of the robot file. Posterior over prior near 1: the data say nothing.
+# Values in the units of the robot file. Posterior over prior near 1: the data do not determine it.
 for item in fields.fitted(fit):
     print(
         f"{item.name:28s} {item.nominal:9.3f} -> {item.value:9.3f} ± {item.sd:.2g} {item.unit:4s}"

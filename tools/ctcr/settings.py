@@ -9,7 +9,7 @@ from math import pi
 
 SIGNIFICANCE = 0.01  # p-value below which noise as stated, or chance, does not explain what readings show
 OUTLIER_WEIGHT = 0.3  # robust weight below which a reading counts as an outlier: 1 plain, 0 not fitted
-SAYS_NOTHING = 0.9  # posterior over prior standard deviation from which the data say nothing of a parameter
+UNDETERMINED = 0.9  # posterior over prior standard deviation from which the data do not determine a parameter
 JOINT_LEVER = 0.02  # [m] of insertion that moves the tip about as far as one radian of rotation
 LOAD_LEVER = 1e-3  # [N] that counts as much as a radian: readings under other loads are never near
 MOVED_FAR = 2.0  # prior standard deviations beyond which a fitted value contradicts the robot file

@@ -69,7 +69,7 @@ def test_undetermined():
     readings = simulation.simulate(robot, replace(plan, alpha=0 * plan.alpha))
     found = calibrate(unknown(robot), replace(readings, quaternion=None), halves=False, hold_out=0)
     said = " ".join([*found.glance().notes])
-    assert "no orientation was measured" in said and "tracker.position.x" in said.split("say nothing of")[1]
+    assert "no orientation was measured" in said and "tracker.position.x" in said.split("do not determine")[1]
     sd = [item.sd for item in found.fitted if item.name.startswith("tracker.sensor_position")]
     assert len(sd) == 3 and min(sd) > 0.9 * robot.uncertainty.tracker_frame_mm
 

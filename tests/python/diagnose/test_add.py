@@ -83,11 +83,11 @@ def test_given_start(robot, plan, hidden):
 
 
 def test_notices(robot, plan):
-    """Data that say nothing of an effect are said to; a single run is judged on blocks of time."""
+    """A notice names an effect that the data do not determine; a single run is judged on blocks of time."""
     timeless = replace(simulation.simulate(robot, plan, "jitter"), t=np.full(len(plan), np.nan))
     one_run = replace(timeless, run=0 * plan.run)
     added = add.add(robot, one_run, ["delay"], free=["tracker.position.*"])
-    assert any("say nothing of delay" in notice for notice in added.notices)
+    assert any("do not determine delay" in notice for notice in added.notices)
     assert added.held_out == "one of every four blocks of time" and np.isfinite(added.rms("rms_mm")["delay"])
 
 

@@ -81,7 +81,7 @@ def shifts(figure, c: Calibration) -> None:
     items = c.fitted[:MOST_NAMES][::-1]
     axes = figure.subplots()
     for y, item in enumerate(items):
-        colour = ERROR if item.implausible or item.at_bound or item.moved_far else FAINT if item.says_nothing else OUT
+        colour = ERROR if item.implausible or item.at_bound or item.moved_far else FAINT if item.undetermined else OUT
         axes.hlines(y, item.shift - item.sd_left, item.shift + item.sd_left, color=colour, lw=2.2)
         axes.plot(item.shift, y, "o", color=colour, ms=4.5)
     reach = max(3.0, 1.1 * max(abs(item.shift) + item.sd_left for item in items))
@@ -115,9 +115,9 @@ def correlations(figure, c: Calibration) -> None:
         right.axhline(edge, color=LINE, lw=1.5)
     figure.colorbar(image, ax=left, location="left", shrink=0.5, pad=0.02, label="correlation")
     ratio = np.array([item.ratio for item in c.fitted[:count]])
-    colours = [FAINT if value > settings.SAYS_NOTHING else OUT for value in ratio]
+    colours = [FAINT if value > settings.UNDETERMINED else OUT for value in ratio]
     right.barh(range(count), 100 * ratio, color=colours, height=0.7)
-    right.axvline(100 * settings.SAYS_NOTHING, color=NOISE, ls="--", lw=1)
+    right.axvline(100 * settings.UNDETERMINED, color=NOISE, ls="--", lw=1)
     right.set(xlim=(0, 105), xlabel="sd left, %")
     right.set_title("sd after / before", fontsize=9)
 

@@ -119,11 +119,11 @@ def rms_mm(robot: Robot, readings: Measurements) -> float:
 
 
 def unknown(covariance: Array) -> list[str]:
-    """Sentences on the directions of position and rotation (6, 6) of which the readings say nothing."""
+    """Sentences on the directions of position and rotation (6, 6) that the readings do not determine."""
     said = []
     for part, kind, what in ((slice(0, 3), "position", "the shift along"), (slice(3, 6), "rotation", "the turn about")):
         variance, axes = np.linalg.eigh(covariance[part, part])
-        for axis in axes.T[np.sqrt(variance) > settings.SAYS_NOTHING * SD[kind]]:
+        for axis in axes.T[np.sqrt(variance) > settings.UNDETERMINED * SD[kind]]:
             words = ", ".join(f"{x + 0.0:.2f}" for x in axis)
             said.append(f"the readings do not determine {what} ({words}) in the tracker's axes: any value is as good")
     return said

@@ -52,7 +52,7 @@ class Added(Shown):
     readings: Measurements  # as they were fitted
     ids: list[str]
     fit: joint.Fit  # of all rows
-    stages: list[Stage]  # nominal, calibrated, each effect, noise floor, at the judged rows
+    stages: list[Stage]  # nominal, calibrated, each effect; `noise_floor`: the tracker's error. Of the judged rows
     held_out: str  # judged runs or blocks of time; empty: the fitted rows were judged
     notices: list[str]
     floors: Floors
@@ -93,7 +93,7 @@ class Added(Shown):
 
     @cached_property
     def robot(self) -> Robot:
-        """With the effects and an entry of the ledger: what `save` writes."""
+        """The robot with the effects and an entry of the ledger, as `save` writes it."""
         changes, entry = _change(self)
         return ledger.changed(self.before, changes, entry, effects=self.after.effects)
 
@@ -352,7 +352,7 @@ def _not_lowered(stages: Sequence[Stage]) -> list[str]:
 
 
 def _notices(robot: Robot, fit: joint.Fit, ids: Sequence[str], explained: bool) -> list[str]:
-    """Doubts about the fitted effects; `explained`: whether the noise explains what is left."""
+    """Doubts about the fitted effects; `explained`: whether the noise explains the residual."""
     known = catalogue.parameter_of(robot.n_tubes)
     said = [wider.sentence for wider in widened(robot, fit.priors.scales)]
     said += [*([] if fit.converged else [f"The fit has {fit.status}."]), *map(sentence, warnings(fit, explained))]
@@ -360,8 +360,8 @@ def _notices(robot: Robot, fit: joint.Fit, ids: Sequence[str], explained: bool) 
     for identity in ids:
         effect = catalogue.get(identity, robot.n_tubes)
         mine = [name for name in effect.amplitudes if name in values]
-        if mine and all(ratios[name] > settings.SAYS_NOTHING for name in mine):
-            said.append(f"The data say nothing of {identity}: {effect.measure}".rstrip())
+        if mine and all(ratios[name] > settings.UNDETERMINED for name in mine):
+            said.append(f"The data do not determine {identity}: {effect.measure}".rstrip())
         elif mine and all(abs(values[name]) < 2 * sds[name] for name in mine):
             said.append(f"{identity} is not larger than its uncertainty: these data do not need it.")
         for name in effect.names():

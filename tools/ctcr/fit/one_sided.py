@@ -34,7 +34,7 @@ def widened(fit: Fit) -> Fit:
         if max(widths) <= settings.ONE_SIDED_WIDEN * sd:
             continue
         side = "longer" if widths[0] > widths[1] else "shorter"
-        warnings.append(f"{name} is bounded on one side only: the readings hardly tell how much {side} it is")
+        warnings.append(f"{name} is bounded on one side only: the readings hardly determine how much {side} it is")
         covariance[i, i] = max(widths) ** 2
     if not warnings:
         return fit

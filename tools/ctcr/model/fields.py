@@ -45,13 +45,13 @@ class Fitted:
 
     @property
     def moved_far(self) -> bool:
-        """Whether what the file says of it can hardly be true."""
+        """Whether the fitted value contradicts the robot file."""
         return isfinite(self.shift) and abs(self.shift) > settings.MOVED_FAR * self.widened
 
     @property
-    def says_nothing(self) -> bool:
-        """Whether the data leave it as unknown as it was."""
-        return self.ratio > settings.SAYS_NOTHING
+    def undetermined(self) -> bool:
+        """Whether the data leave it as uncertain as it was."""
+        return self.ratio > settings.UNDETERMINED
 
     @property
     def flag(self) -> str:
@@ -62,7 +62,7 @@ class Fitted:
             return "at a bound"
         if self.moved_far:
             return "moved far"
-        return "widened" if self.widened > 1 else "unknown" if self.says_nothing else ""
+        return "widened" if self.widened > 1 else "unknown" if self.undetermined else ""
 
 
 def doubts(items: list[Fitted]) -> list[str]:
@@ -71,18 +71,18 @@ def doubts(items: list[Fitted]) -> list[str]:
     bounded = [f"{item.name} ({item.value:.4g} {item.unit}".rstrip() + ")" for item in items if item.at_bound]
     if bounded:
         said.append(
-            f"Ended at a bound of what is possible: {', '.join(bounded)}. Beyond it the error would be smaller, so the "
-            f"model misses something, or the data hardly determine the value."
+            f"Ended at a bound of the possible values: {', '.join(bounded)}. Beyond it the error would be smaller, so "
+            f"the model lacks something, or the data hardly determine the value."
         )
     far = [f"{item.name} ({item.shift:+.1f})" for item in items if item.moved_far]
     if far:
         said.append(
-            f"Moved more than {settings.MOVED_FAR:g} standard deviations of what the robot file says, so either that "
-            f"is wrong or they stand in for something else: {', '.join(far)}."
+            f"Moved by more than {settings.MOVED_FAR:g} standard deviations of the robot file, so either the file is "
+            f"wrong or they compensate for another error: {', '.join(far)}."
         )
-    silent = [item.name for item in items if item.says_nothing]
+    silent = [item.name for item in items if item.undetermined]
     if silent:
-        said.append(f"The data say nothing of {', '.join(silent)}.")
+        said.append(f"The data do not determine {', '.join(silent)}.")
     return said
 
 
@@ -155,7 +155,7 @@ def _sds(fit: Any, key: str, before: list[float]) -> list[float]:
 
 
 def _is_list(robot: Robot, path: FieldPath) -> bool:
-    """Whether the file of a robot has the list of a field; it has none of a pose that is left out or null."""
+    """Whether the robot file has a list for a field; a pose that is absent or null has none."""
     if path[0] != "tracker":
         return True
     return path[1] in robot.tracker.model_fields_set and getattr(robot.tracker, path[1]) is not None
@@ -166,7 +166,7 @@ def _implausible(field: Field, value: float) -> str:
         return ""
     key = field.path[2]
     if key == "poisson_ratio" and value < 0:
-        return f"{value:.2f} is negative, which no tube is: it stands in for something else"
+        return f"{value:.2f} is negative, which no tube is: it compensates for another error"
     quantity = Tube.quantity(key)
     if quantity.is_usual(value):
         return ""
