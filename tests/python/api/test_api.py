@@ -161,6 +161,7 @@ def test_column_in_the_index(table):
 
 
 def test_without_pandas(table, monkeypatch):
+    """Where pandas is missing, the error says that it is needed."""
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ctcr.InputError, match="needs pandas"):
         table.to_frame()

@@ -51,6 +51,7 @@ def assert_within(found: tuple, true: float, most_sd: float) -> None:
 
 
 def test_rotation_offset(values):
+    """The home rotations are within their standard deviations of the true ones."""
     found = values("rotation-offset", DATA / "circles.csv", "--robot", ROBOT)
     for i, true in enumerate(truth("home rotation")):
         assert_within(found[f"tube {i + 1}: rotation offset"], true, 1.0)
@@ -66,6 +67,7 @@ def test_directions(run):
 
 
 def test_registration(values):
+    """The frame is within half a millimetre and 0.3 degrees of the true one."""
     found = values("registration", DATA / "points.csv", "--robot", ROBOT, "--placement-sd-mm", 0.1)
     for axis, true in zip("xyz", (-60.082, 19.556, -179.905), strict=True):
         assert abs(found[f"origin of the base frame, {axis}"][0] - true) < 0.5
@@ -75,6 +77,7 @@ def test_registration(values):
 
 
 def test_home(values):
+    """Home translations and lengths are within their standard deviations of the true ones."""
     found = values("home", DATA / "home.csv", "--robot", ROBOT)
     for i, (beta, length) in enumerate(zip(truth("home translation"), truth("length"), strict=True)):
         assert_within(found[f"tube {i + 1}: home translation"], beta, 1.5)
@@ -95,6 +98,7 @@ def test_cantilever(values):
 
 
 def test_curvature(values):
+    """Curvature and curved length are the true ones, by a scale and by a reference length in the picture."""
     scale = ["--mm-per-px", 1 / 12, "--scale-sd-percent", 0.5]
     found = values("curvature", DATA / "picture.csv", "--robot", ROBOT, "--tube", 2, *scale)
     assert_within(found["curvature"], truth("curvature")[1], 0.2)

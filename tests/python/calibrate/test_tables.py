@@ -23,6 +23,7 @@ def table(tmp_path):
     "heading, value, si", [("x_mm", "12.5", 0.0125), ("x_m", "0.0125", 0.0125), ("x_um", "12500", 0.0125)]
 )
 def test_lengths(table, heading, value, si):
+    """Every unit of length is read in SI."""
     data = tables.read(table(f"motor_angle_deg,{heading},y_mm,z_mm\n90,{value},1,2\n"), ROTATION_OFFSETS)
     assert data["x"] == pytest.approx([si], rel=1e-12) and data.unit["x"] == heading[2:]
     assert data["motor_angle"] == pytest.approx([np.pi / 2])
@@ -31,6 +32,7 @@ def test_lengths(table, heading, value, si):
 
 @pytest.mark.parametrize("heading, factor", [("load_N", 1), ("load_mN", 1e-3), ("load_g", 9.80665e-3)])
 def test_loads(table, heading, factor):
+    """Every unit of a load is read in N; a column that may be absent is."""
     data = tables.read(table(f"{heading},deflection_mm,free_length_mm\n2,1,80\n"), CANTILEVER)
     assert data["load"] == pytest.approx([2 * factor]) and "load_distance" not in data
 
@@ -78,6 +80,7 @@ def test_faults(table, text, faults):
 
 
 def test_no_table(tmp_path):
+    """A file that is no table is refused with its kind."""
     for content, message in (
         (b"PK\x03\x04", "is a spreadsheet"),
         (b"\xff\xfea", "is text in UTF-16"),

@@ -143,6 +143,7 @@ def test_formats_of_pictures(run, tmp_path, name, begins):
 
 
 def test_bench(run, monkeypatch):
+    """Every combination of loads and derivatives is timed, and most configurations are solved."""
     from ctcr.commands import bench
 
     monkeypatch.setattr(bench, "ROWS", 200)

@@ -57,6 +57,7 @@ def test_one_effect(run, name):
 
 
 def test_an_unknown_effect(run):
+    """A misspelt effect is refused with the likely one."""
     code, _, err = run("effects", "fricton")
     assert code == 1 and "did you mean friction?" in err
 
@@ -65,6 +66,7 @@ def test_an_unknown_effect(run):
 
 
 def test_settings(robot):
+    """Settings reach a parameter of a tube, of all tubes, and of an only effect without its name."""
     assert settings(["friction.coefficient.2=0.02"], robot) == {"effects.friction.coefficient.2": 0.02}
     assert settings(["backlash_rotation=0.02"], robot) == {
         f"effects.backlash_rotation.play.{i}": 0.02 for i in (1, 2, 3)
@@ -92,6 +94,7 @@ def test_settings(robot):
     ],
 )
 def test_faults_of_settings(text, message, robot):
+    """Each fault of a setting is named."""
     with pytest.raises(InputError) as error:
         settings([text], robot)
     assert message in str(error.value)
@@ -101,6 +104,7 @@ def test_faults_of_settings(text, message, robot):
 
 
 def test_neutral_effects_change_nothing(robot, plan):
+    """All effects of the catalogue at neutral values predict the readings of the plain robot."""
     everything = catalogue.with_values(robot, list(catalogue.catalogue(3)), {})
     assert set(everything.effects) == set(catalogue.catalogue(3))
     with_them, without = (recording.recording_of(r, plan, ()) for r in (everything, robot))
@@ -127,6 +131,7 @@ def test_model_has_no_sensor(robot, plan, hidden):
 
 
 def test_refusals_of_a_model(robot, hidden):
+    """A model refuses effects that need a history, and other integrators for effects."""
     with pytest.raises(InputError, match="friction, delay need the rows in their order"):
         ctcr.Model(hidden(robot, friction__coefficient="0.01", delay="0.05"))
     with pytest.raises(InputError, match="default integrator, not with rk4"):
@@ -134,6 +139,7 @@ def test_refusals_of_a_model(robot, hidden):
 
 
 def test_remove_undoes_add(run, robot, plan, table, tmp_path, hidden):
+    """Removing effects in reverse order restores every parameter and every predicted reading."""
     data, first, second, third, last = (tmp_path / name for name in ("m.csv", "1.yaml", "2.yaml", "3.yaml", "4.yaml"))
     simulation.write(simulation.simulate(hidden(robot, sensor_offset__x="0.001"), plan), data)
     free = ("--free", ",".join(CALIBRATION))
@@ -178,6 +184,7 @@ def test_remove_forgets_the_sensor(run, robot, plan, tmp_path, hidden):
 
 
 def test_add_without_measurements(run, tmp_path, robot):
+    """A value that is set is written without a fit, the others of the effect at their usual values."""
     target = tmp_path / "new.yaml"
     code, out, _ = run("add", ROBOT, "softening", "--set", "gamma.2=0.01", "-o", target)
     assert code == 0 and "not fitted" in out
@@ -224,6 +231,7 @@ def test_fit_of_a_diagnosis(run, tmp_path, robot, plan, hidden):
     ],
 )
 def test_faults_of_a_diagnosis(text, message, run, tmp_path):
+    """A file that is no diagnosis is refused with its name."""
     answer = tmp_path / "diagnosis.json"
     if text:
         answer.write_text(text)
@@ -244,6 +252,7 @@ def test_faults_of_a_diagnosis(text, message, run, tmp_path):
     ],
 )
 def test_faults_of_add(arguments, message, exits, run, table, tmp_path, monkeypatch):
+    """A refused command says why, and writes nothing."""
     monkeypatch.chdir(tmp_path)
     before = ROBOT.read_bytes()
     code, _, err = run("add", ROBOT, *(table if word == "PLAN" else word for word in arguments))
@@ -259,6 +268,7 @@ def test_output_is_input(run):
 
 
 def test_remove_absent_effect(run, tmp_path):
+    """An effect that the robot lacks cannot be removed."""
     code, _, err = run("remove", ROBOT, "friction", "-o", tmp_path / "x.yaml")
     assert code == 1 and "has no effect friction" in err
 
@@ -335,11 +345,13 @@ def test_odd_ledger(robot):
 
 
 def test_history_of_a_new_robot(run):
+    """A file without a ledger has an empty history."""
     code, out, _ = run("history", ROBOT)
     assert code == 0 and "nothing was changed yet" in out
 
 
 def test_history_report(run, tmp_path, robot, plan, hidden):
+    """The report of a history shows its entries and loads nothing from elsewhere."""
     data, new, page = tmp_path / "m.csv", tmp_path / "new.yaml", tmp_path / "page.html"
     simulation.write(simulation.simulate(hidden(robot, sensor_offset__x="0.001"), plan), data)
     assert run("add", ROBOT, "sensor_offset", "--fit", data, "-o", new, "--free", "tracker.position.*")[0] == 0

@@ -84,6 +84,7 @@ def answers(tmp_path_factory):
 
 
 def test_commands_documented():
+    """docs/json.md describes the JSON of every command."""
     assert set(COMMANDS) == set(documented())
 
 

@@ -11,6 +11,7 @@ SOURCE = re.compile(r"((?:[A-Z][\w-]+(?:, | & )?)+(?: et al\.)?) (\d{4})")
 
 
 def test_the_page_has_the_whole_catalogue():
+    """Every effect has a section that names its parameters."""
     text = PAGE.read_text(encoding="utf-8")
     sections = dict(re.findall(r"^### (\w+)\n(.*?)(?=^##)", text, re.DOTALL | re.MULTILINE))
     known = catalogue.catalogue(1)
@@ -22,6 +23,7 @@ def test_the_page_has_the_whole_catalogue():
 
 
 def test_the_page_lists_the_sources():
+    """Every source that the catalogue cites is in the list."""
     text = PAGE.read_text(encoding="utf-8")
     listed = [" ".join(one.split()) for one in text[text.index("## Sources") :].split("\n- ")]
     cited = [match for effect in catalogue.catalogue(1).values() for match in SOURCE.findall(effect.reference)]

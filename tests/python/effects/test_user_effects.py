@@ -70,6 +70,7 @@ def own_names(effect):
 
 
 def test_neutral_values_change_nothing(robot, readings):
+    """An effect with every hook at neutral values predicts the readings of the library."""
     effect = Everything()
     mine = UserRecording(robot, readings, NAMES + own_names(effect), [effect])
     library = recording.recording_of(robot, readings, NAMES)
@@ -81,6 +82,7 @@ def test_neutral_values_change_nothing(robot, readings):
 
 
 def test_derivatives(robot, readings):
+    """Derivatives by all parameters agree with central differences."""
     effect = Everything()
     names = NAMES + own_names(effect)
     mine = UserRecording(robot, readings, names, [effect])
@@ -333,6 +335,7 @@ def test_load(file, robot, tmp_path):
     ],
 )
 def test_faults_of_a_file(change, message, file):
+    """Each fault of a file of effects is named with the file."""
     path = file(GOOD)
     path.write_text(path.read_text().replace(*change))
     with pytest.raises(InputError) as error:
@@ -341,6 +344,7 @@ def test_faults_of_a_file(change, message, file):
 
 
 def test_all_faults(file):
+    """All faults of an effect are reported at once."""
     text = GOOD.replace('"mine"', '"Mine!"').replace("sigma=0.1", "sigma=-1").replace('"p"', '""')
     with pytest.raises(InputError) as error:
         user_effects.load(file(text))
@@ -363,6 +367,7 @@ def test_all_faults(file):
     ],
 )
 def test_faults_of_a_function(body, message, file, robot, readings, monkeypatch):
+    """Wrong answers of a hook, exceptions and endless calls are named."""
     monkeypatch.setattr(user_effects, "HOOK_SECONDS", 0.2)
     path = file(GOOD)
     path.write_text(path.read_text().replace("return rows.beta, rows.alpha + values.gain * rows.alpha", body))
@@ -389,6 +394,7 @@ def test_endings_of_a_command(ending, when, file, readings, tmp_path, capsys):
 
 
 def test_unknown_name(robot, readings):
+    """A misspelt parameter is refused by its name."""
     with pytest.raises(InputError, match="no parameter is named effects.everything.gian"):
         UserRecording(robot, readings, ["effects.everything.gian"], [Everything()])
 
@@ -430,6 +436,7 @@ def test_profiles(robot, readings):
 
 
 def test_derivatives_by_profiles(robot, readings):
+    """Derivatives by profiles along a tube agree with central differences."""
     names = ["tubes.2.length", *own_names(Profile())]
     mine = UserRecording(robot, readings, names, [Profile()])
     mine.activate((np.arange(len(readings)) % 8 == 0).tolist())
@@ -452,6 +459,7 @@ def test_derivatives_by_profiles(robot, readings):
     ],
 )
 def test_faults_of_a_profile(hook, answer, message, file, robot, readings):
+    """Wrong answers of a hook along a tube are named."""
     text = GOOD.replace("joints(self, rows, values)", f"{hook}(self, tube, along, values)")
     text = text.replace("rows.beta, rows.alpha + values.gain * rows.alpha", answer)
     with pytest.raises(InputError) as error, np.errstate(divide="ignore"):

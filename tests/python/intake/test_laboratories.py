@@ -133,6 +133,7 @@ def test_matrices(truth, log, imported, same):
 
 
 def test_named_matrices(truth, log, imported, same):
+    """Matrices whose columns are named by row and column are read as poses."""
     names = ["t", "b1", "b2", "a1", "a2", *(f"T{i}{j}" for i in range(4) for j in range(4))]
     matrices = np.tile(np.eye(4), (24, 1, 1))
     matrices[:, :3, :3], matrices[:, :3, 3] = truth.rotation.as_matrix(), truth.position

@@ -43,6 +43,7 @@ def ndi(truth, rotation: str) -> str:
 
 @pytest.mark.parametrize("rotation", ["quaternion", "euler"])
 def test_ndi_toolbox(truth, log, joints, imported, rotation):
+    """An export of NDI ToolBox, with quaternions or Euler angles, gives the true table; missing poses stay missing."""
     table, said = imported(log(ndi(truth, rotation)), "--joints", joints, "--sensor", "tip")
     seen = np.arange(24) != 3
     np.testing.assert_allclose(table.position[seen], truth.position[seen], atol=1e-9)
@@ -68,6 +69,7 @@ def test_names_that_come_again(truth, log, joints, imported):
 
 
 def test_ndi_needs_joints_and_a_tool(truth, log, joints, refused):
+    """Without a log of joints, or with an unknown tool, the error says which option helps."""
     path = log(ndi(truth, "quaternion"))
     assert "holds no joints: give their log with --joints" in refused(path, "--sensor", "tip")
     assert "Reference s/n:1" in (error := refused(path, "--joints", joints, "--sensor", "0x0")) and "--sensor" in error

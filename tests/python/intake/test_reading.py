@@ -392,6 +392,7 @@ def test_mapping_survives_its_file(tmp_path):
     ],
 )
 def test_faulty_mapping(log, lines, refused, tmp_path, content, words):
+    """Each fault of a mapping file is named."""
     path = tmp_path / "lab.yaml"
     path.write_text(content)
     assert words in refused(log("\n".join(lines)), "--mapping", path)
@@ -420,6 +421,7 @@ def test_faulty_mapping(log, lines, refused, tmp_path, content, words):
     ],
 )
 def test_faulty_options(log, lines, refused, options, words):
+    """Each fault of an option is named."""
     assert words in refused(log("\n".join(lines)), *options)
 
 
@@ -438,6 +440,7 @@ def test_faulty_options(log, lines, refused, options, words):
     ],
 )
 def test_no_log(log, refused, content, words):
+    """A file that is no log is refused with its kind."""
     assert words in refused(log(content))
 
 
@@ -501,6 +504,7 @@ def test_inputs_are_kept(log, lines, run, tmp_path):
 
 
 def test_json(log, lines, run, tmp_path):
+    """The JSON holds the size of the table and the meaning of each column."""
     code, out, _ = run("import", log("\n".join(lines)), "-o", tmp_path / "out.csv", "--json", "-")
     data = json.loads(out)
     assert code == 0 and data["rows"] == 24 and data["tubes"] == 2
@@ -547,6 +551,7 @@ def test_json(log, lines, run, tmp_path):
     ],
 )
 def test_names(name, role, tube, unit):
+    """Names of columns as laboratories write them have their meaning and unit."""
     found = meaning(name)
     assert (found.role, found.tube, found.unit and found.unit.text) == (role, tube, unit)
 
@@ -555,6 +560,7 @@ def test_names(name, role, tube, unit):
     "name", ["index", "Unnamed: 0", "current_1_A", "alpha1_vel", "", "#3", "rot_360", "wx [rad/s]"]
 )
 def test_names_of_nothing(name):
+    """Names of other quantities have no meaning."""
     assert meaning(name) is None
 
 

@@ -20,7 +20,8 @@ def random_case(name: str, seed: int) -> tuple[Robot, np.ndarray, np.ndarray, np
 
 
 @pytest.mark.parametrize("name", benches.ROBOTS)
-def test_derivatives_are_those_of_the_energy(name):
+def test_derivatives(name):
+    """The gradient and the Hessian of the energy agree with central differences."""
     robot, beta, alpha, force = random_case(name, 1)
     here = bore.loose(robot, beta, alpha, force, 0.1 * bore.radial_gaps(robot))
     energy = bore.LooseEnergy(here, 1e5)
@@ -34,7 +35,8 @@ def test_derivatives_are_those_of_the_energy(name):
     assert_allclose(way @ energy.hessian(x) @ way, curve, rtol=1e-4)
 
 
-def test_one_tube_is_the_standard_robot():
+def test_one_tube():
+    """A single tube, which no bore holds, has the pose of the standard robot."""
     robot, beta, alpha, force = random_case("two_tubes", 3)
     alone = Robot(robot.tubes[:1], robot.gravity)
     expected = solve_pose(alone, beta[:1], alpha[:1], Load(force, UNLOADED))
@@ -44,7 +46,8 @@ def test_one_tube_is_the_standard_robot():
 
 
 @pytest.mark.parametrize("name", benches.ROBOTS)
-def test_a_tube_stays_in_the_bore_and_leans_by_the_root_of_the_gap(name):
+def test_lean_in_the_bore(name):
+    """A tube stays in its bore, and the tip moves with the square root of the gap."""
     robot, beta, alpha, force = random_case(name, 4)
     fitting, gap = solve_pose(robot, beta, alpha, Load(force, UNLOADED)).position, bore.radial_gaps(robot)
 
@@ -58,7 +61,8 @@ def test_a_tube_stays_in_the_bore_and_leans_by_the_root_of_the_gap(name):
     assert 1.5 < off(0.2) / off(0.05) < 2.7  # 2 where no curve starts near the end of an outer tube
 
 
-def test_tight_tubes_fit_the_better_the_harder_they_are(monkeypatch):
+def test_tight_tubes(monkeypatch):
+    """Without a gap, harder contacts approach the standard robot."""
     robot, beta, alpha, force = random_case("two_tubes", 5)
     fitting, off = solve_pose(robot, beta, alpha, Load(force, UNLOADED)).position, []
     for hardest in (1e8, 1e9, 1e10):
@@ -69,7 +73,8 @@ def test_tight_tubes_fit_the_better_the_harder_they_are(monkeypatch):
 
 
 @pytest.mark.parametrize("gap", [0.02e-3, 0.05e-3, 0.1e-3])
-def test_where_a_curved_tube_ends_a_straight_one_leans_as_a_beam_in_a_bore_does(gap):
+def test_lean_at_the_end(gap):
+    """Where a curved outer tube ends, a straight inner one leans like a beam in a bore."""
     inner = Tube(60e9, 0.3, 0.0, 0.8e-3, 1.2e-3, 0.16, 0.02, 0.0)
     outer = Tube(60e9, 0.3, 0.0, 1.2e-3 + 2 * gap, 1.7e-3, 0.10, 0.04, 8.0)  # curved only well beyond the plate
     robot, beta, alpha = Robot((inner, outer), UNLOADED), np.array([-0.03, -0.02]), np.zeros(2)

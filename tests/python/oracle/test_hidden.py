@@ -44,7 +44,8 @@ def tips(effect: str | None, size: float, seed: int, every: int, robot: str, str
 
 
 @pytest.mark.parametrize("name", CAUSES)
-def test_size_zero_is_the_plain_robot_exactly(name):
+def test_size_zero(name):
+    """A cause of size zero gives exactly the poses of the plain robot."""
     streamed = CAUSES[name].streamed
     thinned = 3, 400 if streamed else 84, "two_tubes", streamed
     assert_array_equal(tips(name, 0.0, *thinned), tips(None, 0.0, *thinned))
@@ -108,7 +109,8 @@ def test_detectability(noise):
     assert twice.after_calibration_mm == pytest.approx(2 * shaking.after_calibration_mm)
 
 
-def test_play_follows_late_and_by_its_own_gap():
+def test_play():
+    """The output follows its input late, by the gap on either side."""
     play = Play(np.array([1]), np.array([0.1]), np.array([0.3]))
     outputs = [play(np.array([5.0, q]))[1] for q in (0.0, 0.2, 1.0, 0.8, 0.5)]
     assert_allclose(outputs, [0.0, 0.0, 0.7, 0.7, 0.6])
@@ -132,7 +134,8 @@ def test_metal():
 
 
 @pytest.mark.parametrize("kind", ["jitter", "realistic"])
-def test_noise_has_the_described_size(kind):
+def test_size_of_noise(kind):
+    """Jitter, smooth field error and outliers have the sizes that the description states."""
     tracker = describe("table2")["tracker"]
     rng = np.random.default_rng(8)
     places = rng.uniform(-5, 5, (8000, 3))  # far apart, so that the field is met in many places
@@ -154,6 +157,7 @@ def test_noise_has_the_described_size(kind):
 
 
 def test_field_error_is_smooth():
+    """The field error is correlated over the described length."""
     rng = np.random.default_rng(9)
     places = np.array([0.0, 0.001, 0.1, 0.3])[:, None] * np.array([1.0, 0, 0]) + np.zeros((4, 3))
     errors = np.array(

@@ -140,7 +140,8 @@ def walk(mechanics: Mechanics, corners: list[np.ndarray]) -> list[Rotation]:
     return reached
 
 
-def test_friction_is_that_of_the_slow_energy():
+def test_friction():
+    """Friction in the kernel gives the poses of the slow energy minimisation."""
     robot, law = from_description(describe("two_tubes")), FrictionLaw(0.03, 0.05)
     start, end = np.array([-0.25, -0.16, -0.4, 0.0]), np.array([-0.248, -0.16, -0.1, 0.1])
     slow = FrictionalRobot(robot, law, *np.split(start, 2), 8e-3)

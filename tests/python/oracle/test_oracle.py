@@ -74,7 +74,8 @@ def test_straight_tube():
     assert_pose(twisted, reach * E3, Rotation.from_rotvec(whole_length * E3).as_matrix())
 
 
-def test_small_loads_deflect_like_a_cantilever():
+def test_small_loads():
+    """A small force or weight bends a straight tube like a cantilever."""
     reach, small = 0.1, 1e-4
     robot = straight_tube(small * E1)
     tube, beta = robot.tubes[0], np.array([reach - robot.tubes[0].length])
@@ -148,14 +149,16 @@ def assert_stored_pose(robot: Robot, row: dict[str, float], *, metres: float, ra
 
 
 @pytest.mark.parametrize("table", sorted(REFERENCE.glob("*/*poses.csv")), ids=lambda p: f"{p.parent.name}/{p.stem}")
-def test_stored_poses_come_out_of_another_grid(table):
+def test_stored_poses(table):
+    """Another grid gives the stored poses."""
     robot = load(table.parent / "robot.yaml")
     for row in read_poses(table)[::6]:
         assert_stored_pose(robot, row, metres=3e-7, radians=1e-5, element_length=7e-3, refinements=(1, 2, 3))
 
 
 @pytest.mark.parametrize("name", ["table2", "robot_b"])
-def test_agrees_with_the_shared_reference(name):
+def test_shared_reference(name):
+    """The poses agree with the shared reference poses."""
     if not SHARED.is_dir():
         pytest.skip("the shared reference poses are not here")
     robot = load(SHARED / f"{name}.yaml")

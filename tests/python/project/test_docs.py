@@ -90,12 +90,14 @@ def run(command: list, folder: Path) -> str:
     return done.stdout
 
 
-def test_readme_opens_with_the_two_commands():
+def test_readme_commands():
+    """The README begins with the commands to see and to test the project."""
     assert commands(blocks(ROOT / "README.md", "sh")[0]) == ["tools/dev demo", "tools/dev test"]
 
 
 @pytest.mark.parametrize("language", ["cpp", "python"])
 def test_readme_shows(language):
+    """The README has an example in each language."""
     assert blocks(ROOT / "README.md", language)
 
 
@@ -144,11 +146,13 @@ def test_commands(document, project):
 
 @pytest.mark.parametrize("block", all_blocks("python"))
 def test_python_block(block, project):
+    """Every Python block of the documents runs."""
     run([sys.executable, "-c", block], project)
 
 
 @pytest.mark.parametrize("example", sorted((ROOT / "examples").glob("*.py")), ids=name)
 def test_python_example(example, project):
+    """Every Python example runs."""
     run([sys.executable, example], project)
 
 

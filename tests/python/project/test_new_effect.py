@@ -26,6 +26,7 @@ def new_effect(tree: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_compiles(tree: Path) -> None:
+    """The skeleton compiles without warnings and stands in the catalogue."""
     done = new_effect(tree, "cable_pull")
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == [
@@ -55,6 +56,7 @@ def test_compiles(tree: Path) -> None:
     [("Cable", "is no id"), ("a-b", "is no id"), ("friction", "exists already"), ("frame_jump", "exists already")],
 )
 def test_refuses_names(tree: Path, name: str, why: str) -> None:
+    """A name that cannot be is refused, and the catalogue stays as it is."""
     before = (tree / "include/ctcr/effects/catalogue.hpp").read_text()
     done = new_effect(tree, name)
     assert done.returncode != 0

@@ -40,7 +40,8 @@ def declared(extras: list[str]) -> set[str]:
 
 
 @pytest.mark.parametrize("folder", FOLDERS)
-def test_every_imported_package_is_declared(folder):
+def test_declared_packages(folder):
+    """Every imported package is declared in pyproject.toml."""
     sources = [*(ROOT / folder).rglob("*.py")]
     ours = [*sources, *(ROOT / "tools").rglob("*.py"), *(ROOT / "tests" / "python" / "support").glob("*.py")]
     own = {"ctcr", *(path.stem for path in ours)}
@@ -54,7 +55,8 @@ def test_every_imported_package_is_declared(folder):
     assert not missing
 
 
-def test_planted_imports_are_seen(tmp_path):
+def test_planted_imports(tmp_path):
+    """Imports of every form are found."""
     source = tmp_path / "x.py"
     source.write_text("import a.b\nfrom c.d import e\nfrom . import f\ndef g():\n    import h as i, j\n")
     assert imports(source) == {"a", "c", "h", "j"}

@@ -12,6 +12,7 @@ from ctcr.track.scenario import shipped
 
 
 def test_claim():
+    """A claim shows both values and their ratio, where there is one."""
     assert Claim("I", "x", 2.0, 3.0, "mm").ratio == 1.5
     assert Claim("I", "x", 0.0, 3.0, "mm").ratio is None
     assert Claim("I", "x", 2.0, 3.0, "mm", "because").row() == ["I", "x", "because", "2 mm", "3 mm", "1.5"]

@@ -175,6 +175,7 @@ def test_recorded_homes(robot, tmp_path):
 
 
 def test_number_of_recorded_homes():
+    """Recorded homes need one value for each tube."""
     text = EXAMPLE.read_text().replace("actuation:", "actuation:\n  recorded_home_rotation_deg: [1.0]", 1)
     with pytest.raises(InputError, match="recorded_home_rotation_deg: has 1 values: needs 3, one a tube"):
         robot_file.parse(text.encode())

@@ -90,6 +90,7 @@ def test_no_answers(run, tmp_path, monkeypatch):
 
 
 def test_existing_files_are_kept(run, tmp_path):
+    """A file that exists is not overwritten."""
     path = tmp_path / "robot.yaml"
     path.write_text("mine")
     code, _, err = run("init", "-o", path, "--example", 1)

@@ -54,7 +54,8 @@ def test_si_units():
 
 @pytest.mark.parametrize("key", ["-0.25", "true", "null", "2026-01-01"])
 @pytest.mark.parametrize("name", ["accuracy_95_deg", "name", "length_mm", "translation_mm_per_rev", "tracker_frame_mm"])
-def test_a_key_that_is_no_text_is_a_fault(name, key):
+def test_keys_that_are_no_text(name, key):
+    """A key that is a number, a truth value, null or a date is a fault, not an exception."""
     assert faults(re.sub(rf"\b{name}:", f"{key}:", TEXT, count=1))
 
 
@@ -166,11 +167,13 @@ def test_misspelt_field(key, misspelt, hint):
 
 @pytest.mark.parametrize("field", sorted({*re.findall(r"^[ -]*(\w+):", TEXT, re.M)} - {*defaults.SAID}))
 def test_missing_field(field):
+    """A missing field is named."""
     text = re.sub(rf"\b{field}:", f"zz{field[::-1]}:", TEXT, count=1)
     assert any(problem.field.endswith(field) and "missing" in problem.message for problem in faults(text))
 
 
 def test_tubes_in_reverse_order():
+    """Tubes in the wrong order are a fault."""
     head, *rest = TEXT.split("- youngs_modulus_GPa")
     body, tail = rest[-1].split("actuation:")
     reordered = [body, *rest[:-1][::-1]]
@@ -279,6 +282,7 @@ def test_save(tmp_path):
 
 
 def test_save_robot_without_file(tmp_path):
+    """A robot that came from no file is written whole."""
     robot = Robot.model_validate(parse(TEXT).model_dump())
     robot_file.save(robot, tmp_path / "new.yaml")
     assert robot_file.load(tmp_path / "new.yaml").model_dump() == robot.model_dump()

@@ -82,6 +82,7 @@ def single_end(robot, varied, name):
 
 
 def test_together(robot, varied):
+    """All varied parameters are varied together, within their ranges."""
     low, high = together(robot, varied)
     names = parameters.names_of(3)
     spread = {name for name, a, b in zip(names, low, high, strict=True) if a < b}
@@ -174,12 +175,14 @@ def test_dask(robot, varied, whole, scenario):
 
 
 def test_no_cluster(robot, varied):
+    """A scheduler that does not answer is an error with its address."""
     pytest.importorskip("distributed")
     with pytest.raises(InputError, match="no dask scheduler answers at"):
         open_loop.study(robot, varied, 10, dask="not an address")
 
 
 def test_advice():
+    """The advice names the fewest parameters that bring the error below the accuracy."""
     influence = {"length, tube 1": 0.5, "length, tube 3": 0.4, "tracker position x": 0.05, "wall, tube 1": 0.04}
     advice = advise(influence, 0.5)
     assert advice.calibrate == ["length, tube 1"] and advice.error == pytest.approx(0.49)
@@ -193,6 +196,7 @@ def test_advice():
 
 
 def test_command(tmp_path):
+    """The command writes the report and the JSON, and refuses to study nothing."""
     page, numbers = tmp_path / "page.html", tmp_path / "numbers.json"
     asked = ["sensitivity", str(ROBOT), "--open-loop", "300", "--report", str(page), "--json", str(numbers)]
     done = CliRunner().invoke(cli, asked)

@@ -63,6 +63,7 @@ def test_pipe(tmp_path):
 
 
 def test_read_only_folder():
+    """A folder that cannot be written is an error and stays empty."""
     with tempfile.TemporaryDirectory() as folder:
         os.chmod(folder, 0o555)
         user = os.geteuid()
@@ -85,6 +86,7 @@ def test_absent_folder(tmp_path):
 
 
 def test_link(tmp_path):
+    """Writing through a link changes the file that it points to."""
     (tmp_path / "real").write_text("old")
     (tmp_path / "link").symlink_to("real")
     with output.atomic_writer(tmp_path / "link") as file:

@@ -156,6 +156,7 @@ def test_all_faults(load):
     ],
 )
 def test_header(faults, change, field, message):
+    """Each fault of the header is named with its column."""
     header, rest = as_text(random_table(np.random.default_rng(1), 3, 3), 3).split("\n", 1)
     assert any(p.field == field and message in p.message and p.line == 1 for p in faults(change(header) + "\n" + rest))
 
@@ -204,6 +205,7 @@ def test_robot_file(tmp_path):
 
 
 def test_binary(faults):
+    """Bytes that are no text are faults of their lines."""
     problems = faults(HEADER.encode() + b"\n" + bytes(range(256)), 1)
     assert problems and all(problem.line >= 2 for problem in problems)
 

@@ -79,6 +79,7 @@ def test_attachments(recording, tmp_path):
 
 
 def test_no_recording(tmp_path):
+    """A folder without a recording, or with a damaged one, is refused and nothing is written."""
     with pytest.raises(InputError, match="session.json: cannot read it"):
         write_mcap(tmp_path, tmp_path / "out.mcap")
     for text in ("{", "{}", '{"started_unix_s": NaN, "settings": {}, "sittings": []}'):

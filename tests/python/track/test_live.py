@@ -237,6 +237,7 @@ def test_other_points(bench, tmp_path):
 
 
 def test_person(tmp_path, monkeypatch, capfd):
+    """The person at the bench is asked for each action."""
     monkeypatch.setattr("sys.stdin", io.StringIO("\n\n\n"))
     person = Person(tmp_path)
     person.fasten(1)
@@ -259,6 +260,7 @@ def test_other_angles(robot, bench, tmp_path, last, words):
 
 
 def test_names_with_commas(tmp_path):
+    """Names with commas and quotes survive writing and reading."""
     path = tmp_path / "points.csv"
     with closing(RowFile(path, ["point", "x_mm"])) as file:
         file.append([["hole 3, left", 1.5]])
@@ -319,9 +321,11 @@ def on_bench(tmp_path, *options):
 
 @pytest.mark.alone
 def test_on_the_simulated_bench(tmp_path):
+    """The tests of this file that need a bus run on the simulated bench."""
     on_bench(tmp_path)
 
 
 @pytest.mark.slow
 def test_more_on_the_simulated_bench(tmp_path):
+    """The long ones do, too."""
     on_bench(tmp_path, "-m", "slow")

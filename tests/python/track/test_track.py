@@ -91,6 +91,7 @@ def test_room(robot):
 
 
 def test_force_estimate(robot):
+    """The estimate of an unknown weight at the tip is right across the robot."""
     run = run_once(load("S5"), system_values(robot), system_values(robot), 15.0)
     across = run.force[-1000:].mean(axis=0)[:2]  # along the robot it is stiff: that component is not observed
     assert np.linalg.norm(across - [0, -15 * 9.80665e-3]) < 0.012
@@ -171,6 +172,7 @@ def test_all_faults():
 
 
 def test_start_outside_limits(robot):
+    """A start outside the limits is named with the violated limit."""
     told = r"S2.yaml, line \d+, start.beta_mm: .*base of tube 2 against that of tube 3: 75.5 mm, but .* 76 mm"
     with pytest.raises(InputError, match=told):
         run_all(load("S2", limits={"base_gap_mm": 76.0}), robot, robot)
@@ -192,6 +194,7 @@ def test_start_out_of_reach(robot):
 
 
 def test_path_out_of_reach(robot):
+    """A path out of reach fails, and the verdict says by how much."""
     far = {"kind": "polyline", "points_mm": [[-18.0, 9.0, 170.0], [-18.0, 150.0, 170.0]], "speed_mm_s": 20.0}
     found = figures(run_all(load("S2", trajectory=far), robot, robot))
     assert found["failed"] == found["runs"] and "off by up to" in found["verdict"]
@@ -210,6 +213,7 @@ def test_other_robot(robot):
 
 
 def test_command(tmp_path):
+    """The command writes the report and the JSON of each weight."""
     page, numbers = tmp_path / "page.html", tmp_path / "numbers.json"
     text = BASE.replace("repetitions: 10", "repetitions: 1").replace("mass_g: [0]", "mass_g: [0, 10]")
     (tmp_path / "s.yaml").write_text(text)
