@@ -48,8 +48,8 @@ public:
   AtLimits at_limits = AtLimits::hold;
   TipForce tip_force = TipForce::unknown;
   ForceEstimate estimate;
-  /// How much older tracker readings are than the motor angles that come with them [s], up to 8 periods: the model
-  /// predicts the motion of the tip since. Ref: Smith's predictor.
+  /// Delay of the tracker's readings behind the motor angles of the same period [s], up to 8 periods: the model predicts
+  /// the motion of the tip since then. Ref: Smith's predictor.
   double reading_age = 0;
 
   /// @param system  the sensor sits on the innermost tube   @param period  of the calls [s], > 0

@@ -58,12 +58,12 @@ public:
     return q;
   }
 
-  /// The same of tubes that are stiff in torsion. Real time: yes.
+  /// The same for tubes that are stiff in torsion. Real time: yes.
   Joints<N> advance(const Joints<N>& motors, double time) noexcept {
     return advance(motors, time, {}, [](const Effects&, const Joints<N>&) -> const Model<N, Fx>* { return nullptr; });
   }
 
-  /// With the internal state of now.
+  /// The effects with their present internal state.
   [[nodiscard]] const Effects& effects() const noexcept { return effects_; }
   [[nodiscard]] const Occasion& occasion() const noexcept { return at_; }
 

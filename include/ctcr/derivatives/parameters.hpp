@@ -94,7 +94,8 @@ void put_gravity(const TipSystem<N, true, Stepper>& system, TipDerivatives<N>& o
   for (int j = 0; j < 3; ++j) out.by_parameters.col(gravity + j) = system.by(TipVariables<N, true>::gravity + j);
 }
 
-/// The workspace with the tip frame as it is: its guess may leave turns open that only other loads make felt.
+/// The workspace with the actual tip frame as its guess: without a load a guess may leave turns open, on which only loads
+/// depend.
 template <class Stepper, int N>
 Workspace<N> with_tip_frame(const Robot<N>& robot, const Workspace<N>& ws) noexcept {
   Workspace<N> found = ws;

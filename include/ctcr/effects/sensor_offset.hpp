@@ -33,7 +33,7 @@ inline constexpr std::array parameters{offset.named("x", "tube frame at its tip"
                                        turn("turn_z", 3.2, "of the sensor about the tube")};
 }  // namespace sensor_offset
 
-/// By how much the sensor is off PoseSensor::T_tip_sensor: displaced and turned in the axes of the tip.
+/// Deviation of the sensor from PoseSensor::T_tip_sensor: displacement and rotation in the axes of the tip.
 template <int N, class P = double>
 struct SensorOffset : EffectValues<sensor_offset::parameters, N, P> {
   static constexpr const EffectInfo& info = sensor_offset::info;

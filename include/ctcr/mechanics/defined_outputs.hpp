@@ -14,9 +14,9 @@ namespace ctcr::detail {
 /// How far beyond the length of the robot a position may be [m]: check_joints() forgives 1e-6 a tube.
 template <int N>
 inline constexpr double reach_slack = N * 1e-6;
-/// Entries of R R^T - I above which a rotation is made one again; what one integration leaves is 1e-15.
+/// Entries of R R^T - I above which a rotation is orthonormalised; one integration leaves 1e-15.
 inline constexpr double rotation_error = 1e-13;
-/// Entries of it above which it is none: nothing that was computed with it can be trusted.
+/// Entries of R R^T - I above which R is no rotation: no result that was computed with it can be trusted.
 inline constexpr double no_rotation = 1e-6;
 /// Part of the reach by which a position may go beyond it: the linear correction of a step of 0.1 rad moves a straight
 /// robot by half of it. Where segments bend by radians, one step each can leave tips of outer tubes farther away than they
@@ -101,8 +101,8 @@ inline bool define(Mat3& rotation, Vec3& position, double reach, double drift) n
   return !(error <= drift) || distance > (1 + overreach) * reach + reach_slack<N>;
 }
 
-/// Makes outputs defined that are not: blank where not finite, else the nearest poses that can be. An equilibrium that
-/// needed more than rounding is none.
+/// Makes all outputs defined: blank where they are not finite, else the nearest possible poses. An equilibrium that needs a
+/// correction beyond rounding does not count as one.
 /// @param reach  of the robot [m]   @param drift  of a rotation that the scheme of integration leaves
 /// @return the status
 template <int N>

@@ -81,7 +81,7 @@ CTCR_INLINE void turn_axes(const TipLoad& load, Vec3 (&axis)[A]) noexcept {
   }
 }
 
-/// Turn that brings the guessed tip frame to the found one, as far as the load feels it [rad].
+/// Turn from the guessed tip frame to the found one, as far as the load depends on it [rad].
 template <Loading L>
 CTCR_INLINE Vec3 felt_turn(const Mat3& found, const Mat3& guessed, const TipLoad& load) noexcept {
   if constexpr (L == Loading::force) {

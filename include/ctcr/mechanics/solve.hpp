@@ -506,7 +506,7 @@ CTCR_NOINLINE Status solve(const Model<N, Fx>& model, const Joints<N>& q, const 
 }
 
 /// The control step: Newton's method from the warm start predicted to the new joints, in at most `settings.evaluations`
-/// evaluations; one is usual. The last Newton step is at most 0.01 det B_u [rad], so what is left is of the order of its
+/// evaluations; one is usual. The last Newton step is at most 0.01 det B_u [rad], so the residual is of the order of its
 /// square. Ask for the Jacobian to have the prediction and the corrected pose (without it, the last Newton step is at most
 /// 1e-4 det B_u); J, C and the tips of the outer tubes are those before that step. Where the robot has moved by more than
 /// 0.05 rad since the integration error was last estimated, one of the evaluations, in twice as many steps, estimates it.

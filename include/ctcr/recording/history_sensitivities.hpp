@@ -89,7 +89,7 @@ class HistorySensitivities {
   using S = typename Window::S;
 
 public:
-  /// Fill all windows; then they are known. What is given must outlive that.
+  /// Call fill() for all windows; then the derivatives are known. The arguments must outlive these calls.
   /// @param path       recorded_path() of the rows
   /// @param torsion    with which it was extrapolated
   /// @param variables  indices in SystemParameters<N, Fx>, each once

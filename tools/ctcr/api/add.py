@@ -32,7 +32,7 @@ def add(
     fixed            parameters that keep a value, SI, by name as of `ctcr add --set`: {"friction.coefficient.1": 0.02}
     start            parameters that begin at a value, likewise
     free             other parameters that are fitted too; "standard": the paper's
-    frame_per_run    whether each run has a tracker frame of its own; None: where the readings say so
+    frame_per_run    whether each run has a tracker frame of its own; None: where the readings support it
     anyway           whether to go on where a convention is wrong
     Raises InputError, and WrongConventions unless `anyway`.
     """

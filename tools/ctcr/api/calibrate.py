@@ -31,7 +31,7 @@ def calibrate(
     hold_out         runs held out to judge the fit; None: a quarter, each in turn; 0: none
     halves           whether the fits of two halves of the data are compared
     noise            "jitter", "field" (also the smooth error of the tracker), "auto": the one that the data support
-    frame_per_run    whether each run has a tracker frame of its own; None: where the readings say so
+    frame_per_run    whether each run has a tracker frame of its own; None: where the readings support it
     anyway           whether to go on where a convention is wrong
     Raises InputError, and WrongConventions unless `anyway`.
     """

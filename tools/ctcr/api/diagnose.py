@@ -22,7 +22,7 @@ def diagnose(
 ) -> Diagnosis:
     """Fits every effect of the catalogue together with the calibration, and judges what is missing on held-out runs.
 
-    frame_per_run    whether each run has a tracker frame of its own; None: where the readings say so
+    frame_per_run    whether each run has a tracker frame of its own; None: where the readings support it
     anyway           whether to go on where a convention is wrong
     threads          0: one per core
     progress         called with each step, in words

@@ -15,7 +15,7 @@ from ctcr.robot.description import Robot
 from ctcr.show.wording import listed, sentence
 from ctcr.table.measurements import Measurements, check_of
 
-LOOK_FIRST = "look at the robot file first: what follows may come of it"  # where values in it look wrong
+LOOK_FIRST = "look at the robot file first: the following may result from it"  # where values in it look wrong
 
 
 class WrongConventions(InputError):
@@ -73,7 +73,7 @@ def to_fit(
 
     Left out are copies of rows, poses that the tracker repeated, spikes, and where the runs are sessions, what each has
     of its own.
-    frame_per_run    whether each run has a frame of its own; None: where the readings say so
+    frame_per_run    whether each run has a frame of its own; None: where the readings support it
     finds            kinds of wrong conventions that the fit itself corrects
     Raises WrongConventions where a convention is wrong, unless `anyway`.
     """

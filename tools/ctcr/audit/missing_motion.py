@@ -40,10 +40,10 @@ def completed(robot: Robot, measurements: Measurements) -> tuple[Measurements, l
         return measurements, []
     apart = [1e3 * float(np.median(np.linalg.norm(p[here] - p[visit], axis=1)[visible])) for visit in (other, same)]
     notice = (
-        f"{len(here)} readings return to joints after a long step (rows {listed(measurements.row[here])}). They "
-        f"agree with the earlier visit from the other side than that of the recorded motion ({apart[0]:.2f} mm apart, "
-        f"the visit from this side {apart[1]:.2f} mm): the robot moved in between without a reading. The path of that "
-        "visit is taken for them"
+        f"{len(here)} readings return to joints after a long step (rows {listed(measurements.row[here])}). They are "
+        f"{apart[0]:.2f} mm from the earlier visit that came from the opposite direction, and {apart[1]:.2f} mm from "
+        "the one that came from the recorded direction: the robot moved in between without a reading. They get the "
+        "path of the former"
     )
     return _with_detours(measurements, here, turn), [notice]
 

@@ -105,10 +105,10 @@ def _rotation(robot: Robot, turns: Array) -> Array | None:
 
 
 def position(robot: Robot, measurements: Measurements, tips: Prediction | None = None) -> Array:
-    """The sensor's place (3,) [m] in the frame of the tip that fits the readings best, whatever the file says of it.
+    """The sensor's position (3,) [m] in the frame of the tip that fits the readings best, whatever the file states.
 
-    The tracker frame may be shifted too, as far as its file says; what no tip turns stays near the tip. `tips` as of
-    `placed`.
+    The tracker frame may shift within its stated uncertainty. A component that the readings do not determine, as no tip
+    turns about another axis, stays near 0. `tips` as of `placed`.
     """
     if tips is None:
         measurements, tips = _predicted(robot, measurements)

@@ -42,7 +42,7 @@ class Circles:
 
 @dataclass(frozen=True)
 class Desk:
-    """The devices of a bench, its person, and the folder `place` where its processes meet."""
+    """The devices of a bench, the person at it, and the folder `place` where its processes meet."""
 
     bench: Bench
     place: Path
@@ -81,7 +81,7 @@ def rotation_table(path: str | Path, robot: Robot, desk: Desk, circles: Circles)
 
 
 def point_table(path: str | Path, points: Table, desk: Desk, frames: int, rounds: int) -> None:
-    """Has each named point touched with the probe, in `rounds` rounds; a row a touch.
+    """Asks the person to touch each named point with the probe, in `rounds` rounds; a row a touch.
 
     `points`: a table of CAD_POINTS. Raises InputError where the rows that are there are of other points, DeviceFault
     where the tracker stops.

@@ -84,7 +84,7 @@ def _timed(model, robot, load: str, derivatives: bool, threads: int) -> dict:
 
 
 def random_joints(robot, rows: int, random):
-    """Joints (rows, N), (rows, N) that the robot can reach, uniform in what the neighbours leave free [m], [rad]."""
+    """Joints (rows, N), (rows, N) [m], [rad] that the robot can reach, uniform in the range that neighbours leave."""
     import numpy as np
 
     lengths = robot.lengths

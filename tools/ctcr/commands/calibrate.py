@@ -120,7 +120,7 @@ def rotation_offset(
 @_length("--placement-sd-mm", 0.0, "Standard deviation of the probe from a CAD point, per axis; 0: from the residuals.")
 @_live
 @options.reads("--cad", "CAD.csv", "With --live: names and coordinates of the points, columns as POINTS.")
-@options.setting("--rounds", click.IntRange(1), 1, "With --live: over all points.")
+@options.setting("--rounds", click.IntRange(1), 1, "With --live: rounds over all points.")
 @_procedure
 def registration(
     points, robot, placement_sd_mm, live, bench_path, readings, folder, cad, rounds, out, **target

@@ -9,7 +9,7 @@ from ctcr.commands import options
 @click.argument("source", type=options.read)
 @options.writes("--cpp", "FILE.hpp|.h", "Write the robot of SOURCE as a C++ header.")
 @options.bench("With --cpp: the bench whose limits it holds.", required=False)
-@options.setting("--namespace", str, "robot", "With --cpp: the namespace of what the header declares.")
+@options.setting("--namespace", str, "robot", "With --cpp: the namespace of the header.")
 @options.output("FILE.mcap", "Write the recording of SOURCE as MCAP.")
 def command(source, cpp, bench_path, namespace, target) -> None:
     """Write a robot as a C++ header, or a recording as MCAP.

@@ -36,7 +36,7 @@ _list_option = partial(options.repeated, callback=_names)
 @options.robot_option("Robot file: number of tubes, their lengths and homes.")
 @options.reads("--joints", "LOG", "Another log with the joints, where LOG holds poses alone.", "joint_log")
 @options.reads("--mapping", "FILE.yaml", "Answers kept by --save-mapping; options take precedence.")
-@options.writes("--save-mapping", "FILE.yaml|.yml", "Keep what is said and guessed, for the next log.")
+@options.writes("--save-mapping", "FILE.yaml|.yml", "Keep the given and the guessed answers for the next log.")
 @_pair_option("--column", "columns", "ROLE=NAME", "Column of a role, such as beta1, alpha1, x, qw, t; #3: the third.")
 @click.option("--columns", "listed", metavar="ROLES", help="Roles of all columns in their order; - for none, m1..m16.")
 @_list_option("--ignore", "ignore", "NAME", "A column that must not be used.")
@@ -65,7 +65,7 @@ _list_option = partial(options.repeated, callback=_names)
 @click.option(
     "--euler", metavar="AXES", help="Euler angles: ZYX is R = Rz Ry Rx; zyx, fixed axes; vector: a rotation vector."
 )
-@click.option("--mirror", metavar="AXIS", help="The tracker frame is left-handed: turn this axis round.")
+@click.option("--mirror", metavar="AXIS", help="The tracker frame is left-handed: reverse this axis.")
 @options.json
 def command(log, target, robot, joint_log, mapping, save_mapping, listed, out, **said) -> None:
     """Turn a log into a table of measurements.

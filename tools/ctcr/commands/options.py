@@ -111,7 +111,9 @@ def repeated(name: str, field: str, metavar: str, text: str, **more):
 compiled_robot = click.argument("robot", type=read)  # which `robot_file.load` takes with `compiled`
 measurements = click.argument("measurements", type=read)
 folder_name = click.option(
-    "--folder", metavar="FOLDER", help="Where the processes of one bench meet (mode 0700); default: one of this user's."
+    "--folder",
+    metavar="FOLDER",
+    help="Where the processes of a bench meet (mode 0700); default: a folder of this user.",
 )
 steps = setting(
     "--steps", click.IntRange(1, 1000), 4, "Factor on the integration steps; more are slower, more accurate."
@@ -134,7 +136,7 @@ free = setting(
     "--free",
     str,
     "standard",
-    "Parameters to fit, separated by commas, such as tubes.*.youngs_modulus,tracker.frame; standard: the paper's.",
+    "Parameters to fit, separated by commas: tubes.*.youngs_modulus,tracker.frame; standard: those of the paper.",
     metavar="NAMES",
 )
 
@@ -142,7 +144,7 @@ free = setting(
 frames = click.option(
     "--frame-per-run/--one-frame",
     default=None,
-    help="A tracker frame for every run, or one for all; default: for every run where the readings say so.",
+    help="A tracker frame for every run, or one for all; default: for every run where the readings support it.",
 )
 anyway = click.option("--anyway", is_flag=True, help="Go on where a wrong convention is found (see ctcr compare).")
 

@@ -21,8 +21,8 @@ def command(robot, beta_mm, alpha_deg, force, every, picture, steps, out) -> Non
 
     The joints are one value a tube. Shows the pose of the tip, the ends of the tubes and the stability. The JSON
     holds samples of the backbone [m] in the base frame. Effects that depend on how the joints were reached are left
-    out. Strongly curved tubes that are opposed may rest in several shapes: --all lists those that can be found, and
-    draws the others as dashed lines. In which of them the robot is depends on how it got there.
+    out. A robot of strongly curved tubes may have several stable equilibria: --all lists all that are found, and
+    draws the others as dashed lines. The history of the joints decides in which of them the robot rests.
 
     Example: ctcr shape robot.yaml --beta-mm -330,-240,-165 --alpha-deg 50,-40,-60 -o robot.png
     """

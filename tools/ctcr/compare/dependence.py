@@ -72,7 +72,7 @@ class Dependence:
     """How one quantity is related to the error."""
 
     form: Form  # the best one for this quantity
-    share: float  # of the squared error, held out, beyond a constant; may be negative
+    share: float  # fraction of the squared error beyond a constant, held out; may be negative
     p_value: float  # for the family of all forms
     size_mm: float  # RMS of the fitted dependence
     component: str  # axis of the frame that holds most of it, "" if none does
@@ -101,7 +101,7 @@ class Ranking:
     alone: list[Dependence]
     chosen: list[Dependence]  # share: gained on top of the ones before
     chance_share: float  # the best of all forms reaches this by chance with the probability of the level
-    explained: float  # share of the squared error that the chosen ones predict together
+    explained: float  # fraction of the squared error that the chosen ones predict together
     error: Array  # (K, 3) that was explained, base frame [m], the offset removed
     rows: Integers  # indices of the sample's rows that were used, block by block
     blocks: int

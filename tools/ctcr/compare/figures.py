@@ -114,7 +114,7 @@ def ranking(figure: Figure, c: Comparison) -> bool | None:
         axes.axvline(level, color=NOISE, ls="--", lw=1.2)
         axes.text(level, len(items) - 0.4, " chance rarely exceeds this line", fontsize=8, color=NOISE, va="bottom")
     axes.set(ylim=(-0.6, len(items) + 0.1), xlim=(0, max([*shares, level]) * 1.25 + 1))
-    axes.set_xlabel("share of the squared error predicted on held-out data, %")
+    axes.set_xlabel("fraction of the squared error predicted on held-out data, %")
     axes.grid(axis="y", visible=False)
 
 

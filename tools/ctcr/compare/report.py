@@ -50,7 +50,7 @@ def _findings(c: Comparison) -> str:
         for item in findings(c)
     )
     found = (
-        f'<ol class="findings">{items}</ol><p class="soft">A bar is the share of the squared error that the finding '
+        f'<ol class="findings">{items}</ol><p class="soft">A bar is the fraction of the squared error that the finding '
         f"concerns; shares overlap.</p>"
         if items
         else f"<p>{'None before the conventions are right' if c.wrong else 'No finding beyond noise'}.</p>"
@@ -82,7 +82,7 @@ def _figures(c: Comparison) -> str:
     bars = wide(
         figures.ranking,
         height=4.6,
-        caption=f"Share of the squared error (its constant part removed) that each quantity predicts on "
+        caption=f"Fraction of the squared error (its constant part removed) that each quantity predicts on "
         f"{held_out(c)}. Red: findings, each judged on the residual of the stronger ones. The best of all quantities "
         f"exceeds the dashed line by chance in 1 of 80 tables.",
     )

@@ -37,7 +37,7 @@ CAUSES = {  # by how the name of a dependence begins
 
 @dataclass(frozen=True)
 class Finding:
-    """One sentence or two; share of the squared error it concerns."""
+    """One sentence or two; the fraction of the squared error that they concern."""
 
     text: str
     share: float

@@ -120,8 +120,8 @@ def dependences(c: Comparison) -> Table:
     columns = {
         "depends on": "",
         "frame": "in which the error is predicted",
-        "share": "of the squared error about its offset, predicted on held-out data",
+        "share": "fraction of the squared error about its offset, predicted on held-out data",
         "size, mm": "RMS of the part that is predicted",
-        "p": "probability of such a share by chance",
+        "p": "probability of such a fraction by chance",
     }
     return title, columns, rows, 2

@@ -44,7 +44,7 @@ class Calibrated:
 
     @property
     def typical(self) -> float:
-        """Geometric mean of the error [m of the table]: what decides. Infinite where the model solves too few rows."""
+        """Geometric mean of the error [m of the table], which decides. Infinite where the model solves too few rows."""
         return float(np.exp(self.log_error.mean())) if self.solved.mean() > settings.CONVENTION_SOLVED else np.inf
 
     def at(self, rows: Mask) -> "Calibrated":
@@ -63,7 +63,7 @@ class Calibrated:
         return np.sqrt(np.maximum(sizes**2 - (np.array([JITTER_ALONE, MOST_JITTER]) * self.jitter) ** 2, 0.0))
 
     def left_of(self, before: "Calibrated") -> Array:
-        """The share that is left of the error beyond jitter: typical, and of 90 % of the readings."""
+        """The remaining fraction of the error beyond jitter: typical, and of 90 % of the readings."""
         with np.errstate(invalid="ignore"):  # neither is solved
             return self._beyond_jitter / np.maximum(before._beyond_jitter, 1e-150)
 
@@ -83,7 +83,7 @@ class Calibrated:
 
     @property
     def rms_mm(self) -> float:
-        """Root mean square of the error [mm]: what is shown."""
+        """Root mean square of the error [mm], which is shown."""
         return 1e3 * float(np.sqrt(np.mean(self.error[self.solved] ** 2))) if self.solved.any() else np.inf
 
 

@@ -95,7 +95,7 @@ def _unexplained(case: Case, error: float, found: list[Finding]) -> str:
     left = f"{short(1e3 * error)} mm remain" if np.isfinite(error) else "the model has no solution"
     part = case.share_of(error)
     share = f", {percent(part)} of the deployed length" if np.isfinite(part) else ""
-    nearest = f" Nearest comes: {join([one.text for one in found])}." if found else ""
+    nearest = f" The nearest explanation is: {join([one.text for one in found])}." if found else ""
     return (
         f"After calibration, and under every known convention, {left}{share}: more than effects and data sheets make. "
         "So the table or the robot file is wrong in another way, and effects cannot be judged. Check which point the "
@@ -291,7 +291,7 @@ def _applied(case: Case, wrong: Wrong) -> Case:
 
 
 def _is_far(before: Robot, after: Robot) -> bool:
-    """Whether the sensor is farther from its place than an error of mounting, which is an effect, leaves it."""
+    """Whether the sensor is farther from its place than any mounting error, which is an effect."""
     move = after.tracker.sensor_position - before.tracker.sensor_position
     return float(np.linalg.norm(move)) > settings.SENSOR_JUMP[0]
 
@@ -319,7 +319,7 @@ def _is_jump(case: Case, one: Hypothesis, tried: Tried, half: Calibrated) -> boo
 def offset_of(tried: Tried) -> float:
     """The offset of a home that fits best, SI: that of the hypothesis and what calibration adds to it.
 
-    A right angle is taken for one, where the fit is as near to it as homes are known.
+    A fitted angle that differs from a right angle by less than three standard deviations of homes counts as one.
     """
     (kind, _, size), home, robot = tried.offset.offset, tried.offset.home, tried.case.robot
     size += float(parameters.values(tried.case.fit.robot, [home])[0] - parameters.values(robot, [home])[0])

@@ -63,7 +63,7 @@ def _find_the_joints(story: Story, short: bool) -> None:
         shutil.copy(story.folder / "registered.yaml", story.folder / KNOWN)
         return
     live = f"--live {BENCH} --readings 2 --step-deg 60 --robot registered.yaml -o {KNOWN}"
-    why = "Turn one tube after the other, alone: how they stand at home"
+    why = "Turn one tube after the other, alone, for the home rotations"
     story.do(why, f"calibrate rotation-offset circles.csv {live}", _turned, "circles")
 
 

@@ -15,7 +15,7 @@ STEPS = {
     "Which physical effect is missing?": "diagnose robot.yaml measurements.csv --json found.json --report 2_found.html",
     "Add it": "add robot.yaml --diagnosis found.json --fit measurements.csv -o with_effect.yaml",
     "Compare again: the error falls": "compare with_effect.yaml measurements.csv --report 3_after.html",
-    "How the robot file came to be": "history with_effect.yaml",
+    "Show the history of the robot file": "history with_effect.yaml",
 }
 
 

@@ -74,13 +74,13 @@ class Engine:
         like: ResidualModel | None = None,
         **options: Any,
     ) -> joint.Fit:
-        """Calibration and `added` parameters of effects together, the others of effects at their `fixed` values.
+        """Fits the calibration and the `added` parameters of effects together; other effects keep their `fixed` values.
 
-        near: the start is the end of a similar fit, so that a fit of a part of many rows would teach nothing.
-        like: the model of a similar fit, in whose equilibria the rows begin.
-        Frozen `weights` of outliers and `inflation` of the noise make evidences comparable. Without them both follow
-        the fit: where the model is wrong, the noise is inflated so that calibration stays plausible. Other options as
-        in fit_joint().
+        near: the start is the optimum of a similar fit, so that a first fit to a part of many rows is not needed.
+        like: the model of a similar fit; the rows start from its equilibria.
+        Frozen `weights` of outliers and `inflation` of the noise make log evidences comparable. Without them the fit
+        estimates both. Where the model is wrong, it inflates the noise, so that the calibration stays plausible.
+        Other options as in fit_joint().
         """
         names = [*self.base, *added]
         priors = replace(Priors.of(self.robot, names, self.measurements.beta[self.rows]), scales=self._scales)

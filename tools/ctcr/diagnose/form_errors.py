@@ -39,26 +39,27 @@ def log_density_of_errors(left: float, error: float) -> float:
 
 
 def log_density_of_cause(share: float) -> float:
-    """Log density of the share that a cause explains of what was left before it: likely large."""
+    """Log density of the fraction of the residual before it that a cause explains: likely large."""
     return math.log(2 * min(max(share, 1e-3), 1 - 1e-3))
 
 
 def log_density_of_mend(share: float, error: float) -> float:
-    """Log density of the share that an effect which only mends the forms of others explains of what they left:
+    """Log density of the fraction of their residual that an effect explains which only mends the forms of others:
     exponential between 0 and 1, with the error of these forms as its scale."""
     return -min(max(share, 0.0), 1.0) / error - math.log(-error * math.expm1(-1 / error))
 
 
 def log_odds_of_mend(share: float, before: Sequence[Explaining]) -> float:
-    """Log Bayes factor of an effect that only mends the forms of those before it over a cause, by the share that it
-    explains of what these left: their errors leave little. A cause explains any share, as others may act beside it."""
+    """Log Bayes factor of an effect that only mends the forms of those before it over a cause, by the fraction of their
+    residual that it explains. Errors of forms leave a small residual. A cause may explain any fraction, as others may
+    act beside it."""
     error = form_error(before)
     return log_density_of_errors(left_by(before), error) + log_density_of_mend(share, error)
 
 
 def log_odds_of_imitation(shares: Sequence[float]) -> float:
-    """Log odds that the effects from some point on imitate a cause outside the catalogue, over being causes: by the
-    share that each explains of what those before it left."""
+    """Log odds that the effects from some point on imitate a cause outside the catalogue, over being causes, by the
+    fraction of the residual before it that each explains."""
     odds, likeliest = 0.0, -math.inf
     for k, share in reversed([*enumerate(shares)]):
         odds += log_density_of_cause(1 - share) - log_density_of_cause(share)
@@ -68,8 +69,8 @@ def log_odds_of_imitation(shares: Sequence[float]) -> float:
 
 
 def log_odds_of_cause(share: float, before: Sequence[Explaining]) -> float:
-    """Log odds that an effect, which explains this share of what those before it left, is a cause: over one that mends
-    their forms, where there are any, and over one that imitates a cause outside the catalogue."""
+    """Log odds that an effect, which explains this fraction of the residual before it, is a cause: over one that mends
+    the forms of earlier effects, where there are any, and over one that imitates a cause outside the catalogue."""
     imitation = log_odds_of_imitation([share])
     return -max(log_odds_of_mend(share, before), imitation) if before else -imitation
 

@@ -152,7 +152,7 @@ class Diagnosis(Result):
         self.calibrated, self.with_effects, self.final = map(replace, fits)
 
     def parameters(self, accepted: Accepted) -> dict[str, float]:
-        """Fitted values, and those of its choices, by name without the id."""
+        """The fitted parameters and the choices of an effect, by name without its id."""
         stem = f"effects.{accepted.id}."
         values = dict(accepted.best.candidate.shape) | values_of(self.final)
         return {name.removeprefix(stem): value for name, value in values.items() if name.startswith(stem)}

@@ -155,7 +155,7 @@ def varying_model(engine: Engine, fit: Fit, sample: Sample) -> VaryingModel | No
         whitened = np.hstack([whitened, trials.columns[chosen[-1].index].T])
         columns = np.concatenate([columns, *added], axis=2)
         gradient = whitened.T @ residual
-        gradient[: len(at.names)] = 0.0  # the fit is where prior and readings are in balance
+        gradient[: len(at.names)] = 0.0  # at the optimum, where prior and readings balance
         moved = -np.linalg.solve(whitened.T @ whitened + np.eye(len(gradient)), gradient)
         reached.append((unexplained(at.residual + columns @ moved), moved))
     before, least = reached[0][0], min(left for left, _ in reached)

@@ -327,7 +327,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _fault(error: BaseException, file: str, hook: str) -> Problem:
-    """An exception of the user's code, at the last line of it that was reached."""
+    """An exception of the user's code as an error at the last line of that code which was reached."""
     match error:
         case SystemExit():
             text = "ends the program with sys.exit(): raise an error that says what is wrong"

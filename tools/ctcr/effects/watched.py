@@ -1,4 +1,4 @@
-"""Runs a command in a child process where a user's code is part of it, which may end a process without an exception."""
+"""Runs a command that calls a user's code in a child process: such code may end a process without an exception."""
 
 import mmap
 import os

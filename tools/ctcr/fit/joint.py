@@ -44,7 +44,7 @@ class FitOptions:
     start: Array | None = None  # (n,); the priors' mean by default
     weights: Array | None = None  # (M, 2) robust ones of another fit; by default outliers are found. 0: not fitted
     first_weights: Array | None = None  # (M, 2) from which the search for outliers starts
-    inflation: ArrayLike | None = None  # (2,) of another fit; by default of what the model misses beyond the noise.
+    inflation: ArrayLike | None = None  # (2,) of another fit; by default estimated from errors of the model.
     scales: Scales | None = None  # of another fit, on the stated uncertainties; by default those of most evidence.
     # Log evidences of models can be compared at the same weights, inflation and scales.
     starts: int = 1  # that are compared, all but the first drawn from the priors
@@ -236,8 +236,8 @@ class _FrameAlone(ResidualModel):
 def _with_frame(
     model: ResidualModel, priors: Priors, noise: Noise, positions: Array, rows: Mask, **options: Array | None
 ) -> tuple[Array, Priors]:
-    """Nominal values as a start, with the tracker frame that fits them best, where it and others are free; and priors
-    that are wide enough for it. A frame that is far off would drag the others along."""
+    """The start of a fit and its priors. Where the tracker frame and other parameters are free, the frame is first
+    fitted by itself and its priors are widened: a grossly wrong frame would distort the other parameters."""
     start = np.clip(model.nominal(), priors.low, priors.high)
     frame = np.array([name.startswith("tracker.") for name in priors.names])
     if frame.any() and not frame.all() and rows.any():

@@ -12,21 +12,21 @@ from ctcr.table.sessions import Sessions
 
 
 def as_sessions(robot: Robot, readings: Measurements, *, homes: bool = False) -> Measurements:
-    """The readings without the frame, and with `homes` the homes, that each run has of its own, at the calibration that
-    fits best with these.
+    """The readings with each run's own frame taken out, and with `homes` its own homes too, at the calibration that
+    fits best with them.
 
-    Raises NoFit where none is possible.
+    Raises NoFit where no fit is possible.
     """
     part, rows = part_of_runs(robot, some_runs(readings))
-    # At the robot file's values first: within a fit, what is left of the frames acts linearly.
+    # At the robot file's values first: within a fit, the remaining changes of the frames act linearly.
     sessions = _aligned(robot, part, Sessions.alike(robot, part, homes), settings.SESSION_ALIGNMENTS)
     fit = joint.fit(robot, sessions.taken_out(part), parameters.uncertain(robot), rows=rows, tolerance=settings.COARSE)
     return sessions_at(fit.apply(robot), readings, homes=homes)
 
 
 def sessions_at(robot: Robot, readings: Measurements, *, homes: bool = False) -> Measurements:
-    """The same at the values of this robot. A few rows of each run bring its frame near, a step with all rows makes it
-    exact: a solution of a long table costs more than all else."""
+    """Like as_sessions(), at the values of this robot. A few rows of each run bring its frame near, and one step with
+    all rows makes it exact: solving all rows of a long table is by far the most expensive step."""
     part, _ = part_of_runs(robot, readings)
     sessions = _aligned(robot, part, Sessions.alike(robot, readings, homes), settings.SESSION_ALIGNMENTS)
     return _aligned(robot, readings, sessions, 1).taken_out(readings)

@@ -1,4 +1,4 @@
-"""Text that programs of makers export, told by its first lines: NDI ToolBox, OptiTrack Motive and LabVIEW.
+"""Text exports of makers' programs, recognised by their first lines: NDI ToolBox, OptiTrack Motive and LabVIEW.
 
 The first two say themselves what each column holds, and hold no joints.
 """

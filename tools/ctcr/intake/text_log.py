@@ -232,7 +232,7 @@ def _are_units(fields: list[str]) -> bool:
 def _irregular(
     path: Path, all_rows: Rows, start: int, names: list[str], notes: list[str]
 ) -> tuple[list[list[str]], Integers]:
-    """The columns of rows from `start` on, among which some do not belong to the table, and their lines."""
+    """Columns of the table that begins at row `start`, and the line of each row; other text between rows is skipped."""
     faults, kept, count = Faults(str(path)), [], len(names)
     passed: dict[str, list[int]] = {}
     above, rows = {tuple(fields) for _, fields in all_rows[:start]}, all_rows[start:]

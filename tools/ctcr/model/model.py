@@ -87,7 +87,7 @@ class Shape:
     quaternion: Array  # (K, 4), w first and not negative
     internal_force: Array  # (K, 3) [N], of all tubes together, base frame
     internal_moment: Array  # (K, 3) [N m], the same
-    tube_angle: Array  # (N, K) [rad]; this and what follows is NaN where the tube is not there
+    tube_angle: Array  # (N, K) [rad]; this and all below: NaN where the tube is absent
     tube_curvature: Array  # (N, K, 3) [1/m], bending x, y and twist z, in the tube's own frame
     tube_moment: Array  # (N, K, 3) [N m], in the tube's own frame
 

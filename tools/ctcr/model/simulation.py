@@ -21,7 +21,7 @@ from ctcr.table.measurements import Measurements, group_columns
 Field = Callable[[Array], Array]
 
 NOISES = ("none", "jitter", "realistic")
-OUTLIERS = 0.005  # share of readings that are off by 1 to 3 mm
+OUTLIERS = 0.005  # fraction of readings that are off by 1 to 3 mm
 OUTLIER_M = (1e-3, 3e-3)
 WAVES = 400  # of which the smooth field is the sum
 

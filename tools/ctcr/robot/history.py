@@ -40,8 +40,8 @@ def entries(robot: Robot) -> list[list[str]]:
 def waterfall(robot: Robot) -> list[Stage]:
     """Errors from the oldest entry that has them to the newest, and the expected error of the newest last.
 
-    An entry begins with the error that the one before ended with, so that only the first gives that of the first file.
-    Empty where no entry has an error.
+    Each entry starts from the error at the end of the one before. So the error of the first file is taken from the
+    first entry alone. Empty where no entry has an error.
     """
     stages, floor = [], None
     for entry in robot.history:

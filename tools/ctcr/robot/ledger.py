@@ -111,9 +111,9 @@ def section(entry: dict, *names: str) -> dict:
 
 @contextmanager
 def _unchanged(source: YamlDocument) -> Iterator[None]:
-    """Holds the file of a robot, so that of two commands that change it neither loses what the other wrote.
+    """Locks the file of a robot, so that two commands that change it do not overwrite each other's changes.
 
-    Raises InputError where it is no longer as it was read.
+    Raises InputError where the file has changed since it was read.
     """
     with open_input(source.file) as file:
         fcntl.flock(file, fcntl.LOCK_EX)

@@ -62,7 +62,7 @@ class ClosedLoop:
 def work(text: str, nominal: Array, effects: Array, wrong: Array) -> tuple[float, float]:
     """Mean and largest error [mm] of a controller with the parameters `wrong`; NaN where a run failed.
 
-    All weights of the scenario, which is JSON, one run each with the same noise: plain data that a worker needs.
+    `text` is the scenario as JSON, since workers need plain data. One run for each weight, all with the same noise.
     """
     scenario = Scenario.model_validate_json(text)
     controller, plant = (_core.SystemValues(parameters=values, effects=effects) for values in (wrong, nominal))

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from ctcr.show.style import Picture
 
-# Neither ink nor paper is named: a notebook has its own, light or dark.
+# Colours of text and background are those of the notebook, light or dark.
 _CELL = "padding:.15em .8em;text-align:{};border-bottom:1px solid rgba(128,128,128,.35)"
 
 

@@ -66,7 +66,7 @@ def picture(plot: Callable[[Figure, Any], Any], subject: Any, width: float, heig
 
 
 def shares_below(axes, sizes: Array, **style: Any) -> None:
-    """The share of `sizes` [mm] below each size, in percent; lengths stand on one linear scale."""
+    """The percentage of `sizes` [mm] below each size; lengths stand on one linear scale."""
     share = np.linspace(0, 100, 201)
     before = axes.get_xlim()[1] if axes.lines else 0.0
     axes.plot(np.percentile(sizes, share), share, **style)
@@ -74,7 +74,7 @@ def shares_below(axes, sizes: Array, **style: Any) -> None:
 
 
 def noise_below(axes, sd: float, label: str) -> None:
-    """The share of noise alone below each size, beside what is drawn; `sd` is that of each axis [mm]."""
+    """The percentage of noise alone below each size, beside the curves drawn; `sd` is that of each axis [mm]."""
     if sd > 0:
         reach = axes.get_xlim()[1]
         size = np.append(np.linspace(0, min(5 * sd, reach), 60), reach)

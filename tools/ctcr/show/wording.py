@@ -73,7 +73,7 @@ def times(factor: float) -> str:
 
 
 def percent(share: float) -> str:
-    """A share or a part in two digits, or as many as a whole number has: 0.62 %, 2.6 %, 120 %."""
+    """A fraction in percent, in two digits or as many as a whole number has: 0.62 %, 2.6 %, 120 %."""
     size = abs(share)
     return f"{100 * share:.{0 if size >= 0.1 else 1 if size >= 0.01 else 2}f} %"
 

@@ -69,8 +69,8 @@ class Measurements(Shown):
 
     @classmethod
     def of_joints(cls, beta: Array, alpha: Array, **others: Any) -> "Measurements":
-        """Rows of these joints (M, N) [m], [rad], numbered as in a file; of what `others` do not say: without poses and
-        loads, in one run, a second apart."""
+        """Rows of these joints (M, N) [m], [rad], numbered as in a file. Unless `others` state it, they have no poses
+        and no loads, belong to one run and are a second apart."""
         rows = np.arange(len(beta))
         nothing = {"t": rows.astype(float), "run": np.zeros_like(rows), "force": np.zeros((len(rows), 3))}
         return cls(**nothing | {"position": None, "quaternion": None} | others, beta=beta, alpha=alpha, row=rows + 2)
@@ -118,7 +118,7 @@ class Measurements(Shown):
         return self.t if np.isfinite(self.t).all() else self.row.astype(float)
 
     def without_poses(self, rows: Mask) -> "Measurements":
-        """A copy whose rows (M,) have no pose: what the tracker gave there is no reading."""
+        """A copy without the poses of these rows (M,), which are no readings."""
         poses = {"position": self.position, "quaternion": self.quaternion}
         kept = {name: np.where(rows[:, None], np.nan, old) for name, old in poses.items() if old is not None}
         return replace(self, **kept)
@@ -212,7 +212,7 @@ def _tubes_of(columns: tuple[str, ...]) -> int:
 
 
 def _read(table: Table, n_tubes: int, plausible: bool = True) -> Measurements:
-    """`plausible`: whether values must be those of such a robot in the right units: else any finite numbers will do."""
+    """Reads the measurements of a table. `plausible`: values outside the usual ranges are faults too."""
     groups = _groups(table, n_tubes)
     faults = Faults(str(table.path))
     data = {name: np.empty((table.n_rows, len(columns))) for name, columns in groups.items()}

@@ -1,1 +1,1 @@
-"""Scenarios of closed-loop control: a robot file, a scenario file, and what became of them."""
+"""Scenarios of closed-loop control: a robot file, a scenario file, and their results."""

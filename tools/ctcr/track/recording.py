@@ -42,7 +42,7 @@ def control_row(t: float, run: int, result, row: int) -> list[float | str]:
 
 
 def finished(folder: Folder) -> list[dict]:
-    """The entries of the runs that came to their end."""
+    """The entries of the finished runs."""
     return [entry for entry in folder.about.get("runs", []) if entry["ended"] == "finished"]
 
 

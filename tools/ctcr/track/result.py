@@ -17,7 +17,7 @@ COLUMNS = {
     "mean, mm": "mean distance of the tip from its reference",
     "p99.8, mm": "998 of 1000 distances are below",
     "max, mm": "largest distance",
-    "< 1 mm, %": "share of the distances below 1 mm",
+    "< 1 mm, %": "fraction of the distances below 1 mm",
     "obstacle, mm": "least distance of the tip from the obstacle",
     "failed": "runs that failed",
 }

@@ -59,7 +59,7 @@ class Start(Section):
 class Tasks(Section):
     """Weights [of translation, of rotation] and settings; a weight of 0 leaves a task out. Paper, Section IV.B.
 
-    The second weight of tracking asks for the orientation of the base: the tip points along its z, unturned.
+    The second weight of tracking demands the orientation of the base frame: the tip points along z, without a turn.
     """
 
     tracking: Weight = [1e7, 0.0]

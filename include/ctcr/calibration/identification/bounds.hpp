@@ -150,7 +150,7 @@ private:
     }
     return false;
   }
-  /// Makes a side a coordinate of its own, unless it depends on those that there are.
+  /// Adds a side as a coordinate, unless it depends linearly on the present ones.
   void append(const Side& side) {
     constexpr double dependent = 1e-3;
     Eigen::VectorXd apart = side.change;

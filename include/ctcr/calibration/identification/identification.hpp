@@ -49,7 +49,7 @@ struct Identification {
   std::vector<Direction> directions;  ///< undetermined ones
 
   double chi_square = 0;            ///< of the residuals under the noise as stated, outliers counting for little
-  double admitted_chi_square = 0;   ///< the same under the noise as the fit had to admit it
+  double admitted_chi_square = 0;   ///< the same under the noise with the inflation of the fit
   double shift_square = 0;          ///< sum of the squared shifts, of correlated priors in their metric
   Eigen::Index observations = 0;    ///< numbers fitted
   double bulk_observations = 0;     ///< without the outliers: degrees of freedom of chi_square + shift_square

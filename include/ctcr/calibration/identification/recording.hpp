@@ -148,7 +148,7 @@ public:
 
   /// Of each row the branch that came nearest to its reading.
   [[nodiscard]] const std::vector<NearestEquilibrium<N>>& equilibria() const { return equilibria_; }
-  /// Takes over those of a recording of the same table, perhaps with other effects, where they are nearer.
+  /// Takes over the equilibria of another recording of the same table, perhaps with other effects, where they are nearer.
   void begin_in(const std::vector<NearestEquilibrium<N>>& others) {
     if (others.size() != equilibria_.size()) return;
     for (std::size_t i = 0; i < others.size(); ++i) equilibria_[i].improve(others[i].start, others[i].missed);

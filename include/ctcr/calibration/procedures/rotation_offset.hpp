@@ -31,7 +31,7 @@ struct RotationOffsetOptions {
 
 enum class RotationOffsetNotice {
   one_direction,      ///< figure: the direction there is
-  directions_differ,  ///< figure: offset forward - backward [rad]; friction or backlash, none of it in the mean if alike
+  directions_differ,  ///< figure: offset forward - backward [rad]; friction or backlash; equal ones cancel in the mean
   arc_too_short,      ///< figure: how many times less certain the offset is than on a known circle
   radius_too_small,   ///< figure: radius [m]
   not_round,          ///< figure: amplitude of a radial error twice a turn [m]

@@ -199,8 +199,8 @@ inline std::vector<LineAndArc> starts(std::span<const Vec2> points) {
 
 }  // namespace tube_shape
 
-/// Fits a straight line that goes over into an arc of constant curvature to points of a tube, in any order, and finds
-/// out which end is curved. Outliers are found with a robust loss and left out.
+/// Fits a straight line followed by an arc of constant curvature to points of a tube in any order, and finds which end is
+/// curved. A robust loss finds outliers, which are left out.
 /// @param points  on the middle of the tube (or all on one edge), taken up to its tip
 /// @throws std::invalid_argument for fewer than 8 points, coincident points, and numbers that are not finite. Real time: no.
 [[nodiscard]] inline TubeShapeFit fit_tube_shape(std::span<const Eigen::Vector2d> points,

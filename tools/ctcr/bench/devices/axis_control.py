@@ -164,7 +164,7 @@ class AxisControl:
         self._motion, self._guarded = StraightMove(self.setpoint, target, speeds, self._settings.ramp_s), False
 
     def _go_at(self, speeds: ArrayLike, ramps: float, valid_s: float) -> None:
-        """To other speeds, with ramps so many times as steep as those of a move."""
+        """Changes to other speeds, with ramps so many times as steep as those of a move."""
         accelerations = ramps * self._settings.accelerations
         self._motion = VelocityMove(self.setpoint, self._speeds, speeds, accelerations, valid_s)
         self._guarded = False

@@ -13,7 +13,7 @@ def release(folder: Path) -> list[str]:
     """Resets the terminals that report an error, then lets the motors move again; what was done, in words.
 
     The terminals are those that a program drove last. Where they cannot be asked, the next program asks them. Raises
-    DeviceFault where one keeps its error, or while another program drives them: then the stop holds.
+    DeviceFault where one keeps its error, or while another program drives them: then the stop stays.
     """
     said = _reset(folder)
     reason = emergency_stop.reason(folder)

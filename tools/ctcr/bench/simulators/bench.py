@@ -1,4 +1,4 @@
-"""Both simulators around one robot, while some work is done beside them, in a network that needs no rights."""
+"""Runs both simulators around one robot during some work, in a network namespace that needs no privileges."""
 
 import multiprocessing
 import os
