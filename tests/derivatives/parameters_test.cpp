@@ -214,17 +214,23 @@ TEST(TipDerivatives, ByLoadsAreTheComplianceOfAnyTube) {
     }
 }
 
-TEST(TipDerivatives, AreZeroWithoutASolution) {
-  const Model<3> model(test::paper_robot());
-  Workspace<3> ws;
-  TipDerivatives<3> d;
-  d.by_joints.setOnes();
-  Mat6 compliance = Mat6::Ones();
-  EXPECT_EQ(differentiate_tip(model, ws, 0, d), Status::not_converged);
-  EXPECT_TRUE(d.by_joints.isZero(0) && d.by_parameters.isZero(0));
-  d.by_joints.setOnes();
-  EXPECT_EQ(differentiate_tip(model, ws, 0, d, compliance), Status::not_converged);
-  EXPECT_TRUE(d.by_joints.isZero(0) && d.by_parameters.isZero(0) && compliance.isZero(0));
+TEST(TipDerivatives, AreZeroWithoutASolutionOrTube) {
+  test::Random random(6);
+  const auto expect_zero = [](const Model<3>& model, const Workspace<3>& ws, int tube, Status status) {
+    TipDerivatives<3> d;
+    d.by_joints.setOnes();
+    Mat6 compliance = Mat6::Ones();
+    EXPECT_EQ(differentiate_tip(model, ws, tube, d), status);
+    EXPECT_TRUE(d.by_joints.isZero(0) && d.by_parameters.isZero(0));
+    d.by_joints.setOnes();
+    EXPECT_EQ(differentiate_tip(model, ws, tube, d, compliance), status);
+    EXPECT_TRUE(d.by_joints.isZero(0) && d.by_parameters.isZero(0) && compliance.isZero(0));
+  };
+  expect_zero(Model<3>(test::paper_robot()), {}, 0, Status::not_converged);
+  for (const Acting acting : all) {
+    const Solved<3> c = random_case<3>(acting, {}, true, random);
+    for (const int tube : {-1, 3}) expect_zero(Model<3>(c.robot), c.ws, tube, Status::invalid_settings);
+  }
 }
 
 TEST(TipDerivatives, DoNotTouchTheHeap) {

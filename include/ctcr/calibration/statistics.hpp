@@ -16,6 +16,9 @@ inline double median(std::vector<double> values) {
   return *middle;
 }
 
+/// Median length of a vector of one, and of three, standard normal components.
+inline constexpr double median_length_1 = 0.67449, median_length_3 = 1.53817;
+
 /// Score of a chi-square value. Ref: Wilson, Hilferty, "The distribution of chi-square", 1931.
 inline double chi_square_score(double chi_square, double degrees) noexcept {
   const double v = 2.0 / (9.0 * degrees);

@@ -11,8 +11,9 @@
 
 namespace ctcr {
 
-/// A cubic spline through points, travelled from rest to rest along its arc length. Through points that are no way, see
-/// check(), it rests at the first one.
+/// A cubic spline through points, travelled from rest to rest along its arc length. Speed and acceleration bound the motion
+/// along the curve; across it the acceleration is the square of the speed times the curvature. Through points that are no
+/// way, see check(), it rests at the first one.
 class SplinePath {
 public:
   /// @param points  at least 4, none twice in a row [m], base frame. Allocates. Otherwise as

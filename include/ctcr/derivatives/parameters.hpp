@@ -140,11 +140,13 @@ Status differentiate_loaded(const Robot<N>& robot, const Workspace<N>& ws, int t
 /// curved, for its derivatives by curvature: its curve then starts at a breakpoint that solve() does not have. Those by
 /// gravity at zero gravity are of the model with weight, integrated in as many steps.
 /// @param ws    as solve() or step() left it for this model   @param tube  whose tip, 0 is the innermost
-/// @return ok; singular: near a bifurcation, large derivatives; not_converged: `ws` holds no solution; not_finite. The
-///         last two leave zeros. Real time: yes, about N + 1 integrations with eight columns each.
+/// @return ok; singular: near a bifurcation, large derivatives; not_converged: `ws` holds no solution; invalid_settings:
+///         there is no such tube; not_finite. The last three leave zeros. Real time: yes, about N + 1 integrations with
+///         eight columns each.
 template <class Stepper = MagnusRk4, int N>
 CTCR_NOINLINE Status differentiate_tip(const Model<N>& model, const Workspace<N>& ws, int tube,
                                        TipDerivatives<N>& out) noexcept {
+  if (tube < 0 || tube >= N) return out = {}, Status::invalid_settings;
   Status status = Status::not_converged;
   const bool loaded = !model.robot().gravity.isZero(0.0) || !ws.load.force.isZero(0.0) || !ws.load.moment.isZero(0.0);
   if (!ws.warm)
@@ -163,8 +165,8 @@ CTCR_NOINLINE Status differentiate_tip(const Model<N>& model, const Workspace<N>
 template <class Stepper = MagnusRk4, int N>
 CTCR_NOINLINE Status differentiate_tip(const Model<N>& model, const Workspace<N>& ws, int tube, TipDerivatives<N>& out,
                                        Mat6& compliance) noexcept {
-  Status status = Status::not_converged;
-  if (ws.warm) {
+  Status status = tube < 0 || tube >= N ? Status::invalid_settings : Status::not_converged;
+  if (status == Status::not_converged && ws.warm) {
     status = detail::differentiate_loaded<Stepper>(model.robot(), ws, tube, out, &compliance);
     if (out.by_joints.allFinite() && out.by_parameters.allFinite() && compliance.allFinite()) return status;
     status = Status::not_finite;

@@ -70,7 +70,7 @@ inline void add_warnings(const std::vector<FreeParameter>& parameters, const Pos
   const auto n = Eigen::Index(parameters.size());
   if (out.observations < few_per_parameter * n)
     warn("only " + std::to_string(out.observations) + " numbers were measured for " + std::to_string(n) +
-         " parameters: " +
+         (n == 1 ? " parameter: " : " parameters: ") +
          (out.observations < n ? "the prior decides" : "few are left to tell a wrong model from a right one"));
   std::vector<std::string> idle, open, moved, stopped;
   for (Eigen::Index k = 0; k < n; ++k) {
@@ -91,8 +91,8 @@ inline void add_warnings(const std::vector<FreeParameter>& parameters, const Pos
   warn_of(open, "determined neither by these readings nor by a prior: give it one or leave it out");
   warn_of(
       moved,
-      "moved by more than 2 prior standard deviations (the prior is too narrow, or the value stands in for something "
-      "else)");
+      "moved by more than 2 prior standard deviations (the prior is too narrow, or the value makes up for an error of "
+      "the model)");
   warn_of(stopped, "stopped at a bound");
   for (const std::string& text : reached) warn("the fit stopped where " + text);
   if (posterior.singular() && out.sd.allFinite()) warn("some combination of the parameters is not determined");
@@ -106,7 +106,7 @@ inline void add_warnings(const std::vector<FreeParameter>& parameters, const Pos
     const auto low = used - (out.weights.col(kind).array() > 0.5 * use.col(kind).array()).count();
     if (double(low) > 0.02 * double(used))
       warn(std::to_string(low) + " of " + std::to_string(used) + (kind ? " rotations" : " positions") +
-           " are outliers and count for little");
+           (low == 1 ? " is an outlier and counts for little" : " are outliers and count for little"));
   }
 }
 

@@ -25,7 +25,6 @@ inline double inlier_fraction(double square) noexcept {
 /// @param use  weights before outliers are found; 0 stays 0
 inline RowWeights outlier_weights(const Noise& noise, const Eigen::Array2d& inflation, const Whitening& whitening,
                                   const Eigen::VectorXd& residual, const RowWeights& use) {
-  constexpr double median_of_chi_square = 2.366;  // of three
   RowWeights weights = use;
   const Eigen::VectorXd left = residual - whitening.field(residual);
   for (int kind = 0; kind < 2; ++kind) {
@@ -40,7 +39,7 @@ inline RowWeights outlier_weights(const Noise& noise, const Eigen::Array2d& infl
     for (Eigen::Index i = 0; i < square.size(); ++i)
       if (use(i, kind) > 0) used.push_back(square[i]);
     if (used.empty()) continue;
-    const double usual = std::max(1.0, median(used) / median_of_chi_square);
+    const double usual = std::max(1.0, median(used) / (median_length_3 * median_length_3));
     for (Eigen::Index i = 0; i < square.size(); ++i)
       if (use(i, kind) > 0) weights(i, kind) = use(i, kind) * std::pow(inlier_fraction(square[i] / usual), 2);
   }

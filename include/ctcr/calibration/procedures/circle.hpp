@@ -154,7 +154,7 @@ inline double robust_sd(const std::vector<CircleReading>& readings, const Circle
   std::vector<double> distance;
   for (const auto& [angle, position, series] : readings)
     distance.push_back((position - circle.at(angle, series)).norm());
-  return median(distance) / 1.5382;  // median length of a vector of three standard normal components
+  return median(distance) / median_length_3;
 }
 
 /// Columns, one to a coordinate of a reading, of the errors that friction, an eccentric drive or a bent frame would add:

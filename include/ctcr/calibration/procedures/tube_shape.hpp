@@ -239,10 +239,10 @@ inline std::vector<LineAndArc> starts(std::span<const Vec2> points) {
   double sd = 0;
   const auto scale = [&] { return std::max({sd, options.point_sd, 1e-4 * size}); };  // no photo is finer
   for (int k = 0; k < 3; ++k) {
-    sd = median_distance(points, bend) / 0.6745;
+    sd = median_distance(points, bend) / median_length_1;
     bend = refined(points, bend, scale(), 2.5 * scale()).bend;
   }
-  sd = median_distance(points, bend) / 0.6745;
+  sd = median_distance(points, bend) / median_length_1;
   TubeShapeFit result{};
   std::vector<Vec2> used;
   for (std::size_t i = 0; i < points.size(); ++i) {
