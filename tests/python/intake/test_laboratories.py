@@ -171,6 +171,23 @@ def test_clocks(truth, log, imported, refused, same):
     assert "'noon' is no time that is understood: 2026-05-04 10:15:30.25" in error
 
 
+@pytest.mark.parametrize(
+    ("names", "forms"),
+    [(["Datum", "Uhrzeit"], ["%d.%m.%Y", "%H:%M:%S,%f"]), (["Date", "Time"], ["%m/%d/%Y", "%I:%M:%S.%f %p"])],
+)
+def test_days_beside_the_clock(truth, log, imported, names, forms):
+    """A column of dates beside one of times of day tells that the second run was measured two days later."""
+    start = datetime(2026, 5, 30, 22, 15)
+    moments = [start + timedelta(days=2 * int(run), seconds=t) for t, run in zip(truth.t, truth.run, strict=True)]
+    stamps = [[moment.strftime(form) for moment in moments] for form in forms]
+    joints = ["beta1", "beta2", "alpha1", "alpha2"]
+    path = log(text([*names, *joints], [*stamps, truth.beta, truth.alpha], ";"))
+    table, said = imported(path)
+    np.testing.assert_allclose(table.t, truth.t - truth.t[0] + 2 * 86400 * truth.run, atol=2e-6)
+    assert "t_s (the day)" in said and f"t_s = 0 is {stamps[0][0]} {stamps[1][0]}" in said
+    assert imported(path, "--ignore", names[0])[0].t[-1] < 1
+
+
 def test_forces(truth, log, imported, same):
     """Millinewtons of the reaction."""
     names = ["t", "beta1", "beta2", "alpha1", "alpha2", "Fx [mN]", "Fy [mN]", "Fz [mN]", "x", "y", "z"]

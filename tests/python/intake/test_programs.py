@@ -1,6 +1,7 @@
 """Exports of other programs: NDI ToolBox, OptiTrack Motive, MATLAB, MCAP; poses and joints in two logs."""
 
 import json
+from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
@@ -119,6 +120,22 @@ def test_joints_between_their_rows(truth, log, imported, refused):
     assert "partial.csv: has no row with a time and all joints" in refused(poses, "--joints", partial)
 
 
+@pytest.mark.parametrize("kind", ["date", "clock", "stamp"])
+def test_clocks_of_two_kinds(truth, log, imported, refused, kind):
+    """Beside seconds since a start, times of day and dates count from their first row, once an offset is given."""
+    start = datetime(2026, 5, 4, 10, 15, 30)
+    moments = [start + timedelta(seconds=t) for t in truth.t - truth.t[0]]
+    if kind == "stamp":
+        stamps = [f"{(moment - datetime(1970, 1, 1)).total_seconds():.6f}" for moment in moments]
+    else:
+        stamps = [f"{moment:{'%Y-%m-%dT' if kind == 'date' else ''}%H:%M:%S.%f}" for moment in moments]
+    joints = log(text(["clock", *JOINTS[2:]], [stamps, truth.beta, truth.alpha]), "joints.csv")
+    poses = log(text(["t", "x", "y", "z"], [truth.t - truth.t[0] + 3.0, truth.position]))
+    assert "such as --offset t=" in refused(poses, "--joints", joints)
+    table, _ = imported(poses, "--joints", joints, "--offset", "t=-3s")
+    np.testing.assert_allclose(table.beta[1:-1], truth.beta[1:-1], atol=1e-6)
+
+
 def test_one_log_without_times(truth, log, joints, imported, refused, tmp_path):
     """The error names the log that lacks times, and what to do; a frame number with its unit is a time."""
     t = np.round(truth.t / 0.005) * 0.005
@@ -153,6 +170,19 @@ def test_mat(truth, tmp_path, imported, same, refused):
     assert "--quaternion" in refused(path)
     path.write_bytes(b"MATLAB 5.0 MAT-file" + bytes(200))
     assert "damaged" in refused(path) or "no arrays" in refused(path)
+
+
+@pytest.mark.parametrize("whole_runs", [False, True])
+def test_mat_array_of_structures(truth, tmp_path, imported, same, whole_runs):
+    """A structure is a row, or a run where it holds columns."""
+    parts = (slice(0, 12), slice(12, 24)) if whole_runs else range(24)
+    names = {"t": truth.t, "beta": truth.beta, "alpha": truth.alpha, "pos": truth.position}
+    array = np.empty(len(parts), [(name, "O") for name in names])
+    array[:] = [tuple(values[part] for values in names.values()) for part in parts]
+    savemat(tmp_path / "log.mat", {"trials": array})
+    table, _ = imported(tmp_path / "log.mat")
+    same(table, orientation=False)
+    assert np.ptp(table.run) == int(whole_runs)
 
 
 def test_numpy(truth, tmp_path, imported, refused, same):

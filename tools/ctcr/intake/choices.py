@@ -22,10 +22,9 @@ ORDERS = ("innermost-first", "outermost-first")
 QUATERNIONS = ("wxyz", "xyzw")
 GROUPS = {"t": "time", "beta": "length", "alpha": "angle", "force": "force", "position": "length", "euler": "angle"}
 _POSE = r"[xyz]|q[wxyz]|r[xyz]|m\d{1,2}"
-_ROLE = re.compile(rf"t|nsec|run|seen|weight|(?:beta|alpha)[1-9]|f[xyz]|(?:ref_)?(?:{_POSE})")
-ROLES = (
-    "t, nsec, run, beta1.., alpha1.., fx, fy, fz, weight, x, y, z, qw, qx, qy, qz, rx, ry, rz, m11.. or m1..m16, seen"
-)
+_ROLE = re.compile(rf"t|nsec|date|run|seen|weight|(?:beta|alpha)[1-9]|f[xyz]|(?:ref_)?(?:{_POSE})")
+ROLES = "t, nsec, date, run, beta1.., alpha1.., fx, fy, fz, weight, x, y, z, qw, qx, qy, qz, rx, ry, rz, "
+ROLES += "m11.. or m1..m16, seen"
 HEAD = "# How the columns of these logs become measurements: ctcr import LOG --mapping THIS -o measurements.csv\n"
 
 

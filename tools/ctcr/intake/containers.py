@@ -141,6 +141,8 @@ def _arrays(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
     if isinstance(value, dict):
         for name, inner in value.items():
             yield from _arrays(f"{prefix}.{name}" if prefix else name, inner)
+    elif isinstance(value, list) and all(isinstance(item, dict) for item in value):  # as scipy reads structures
+        yield from _arrays(prefix, np.array(value, dtype=object))
     elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.ndim in (1, 2, 3):
         yield prefix, value
     elif isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "OU":

@@ -50,13 +50,13 @@ def convert(log: Log, choices: Choices, robot: Robot | None = None, joints: Log 
     moved = motion.of(moving, robot)
     pose = sensor.of(columns)
     t, zero = motion.times(columns) if beside else (moved.t, moved.zero)
-    shift = units.value(choices.offsets["t"], "time", "--offset t") if "t" in choices.offsets else 0.0
+    shift = units.value(choices.offsets["t"], "time", "--offset t") if "t" in choices.offsets else None
     columns.faults.raise_any()
     moving.faults.raise_any()
     if beside:
-        moved = together.at(columns, moving, moved, t, zero + shift)
+        moved = together.at(columns, moving, moved, t, zero, shift)
     else:
-        moved.t = moved.t + shift
+        moved.t = moved.t + (shift or 0.0)
     kept = motion.complete(columns, moved)
     moved = moved.only(kept)
     if not len(moved.rows):
@@ -101,10 +101,14 @@ def _check_joints(columns: Columns) -> None:
     missing = [role for role in wanted if role not in used and role not in choices.constants]
     if len(missing) == len(wanted):
         text = "no column looks like a joint: name them with --column beta1=NAME, --column alpha1=NAME, ..."
+        text += "" if columns.beside else ", or all in their order with --columns t,beta1..beta2,alpha1..alpha2,x,y,z"
         if log.is_stated:
             text = f"an export of {log.kind} holds no joints: give their log with --joints FILE"
         elif all(name.startswith("#") for name in log.names):
             text = "it has no header: name its columns in their order, such as --columns t,beta1..beta2,alpha1..alpha2"
+            if columns.beside:
+                text = "it has no header: write a line above it, such as t,beta1,beta2,alpha1,alpha2, which names its"
+                text += " columns in their order, with nothing between commas for one that does not count"
     elif missing:
         still = "0mm where it never moves" if missing[0].startswith("beta") else "0deg where it never turns"
         text = (

@@ -132,10 +132,15 @@ class Times:
     start: str  # what stood there at zero, "" where that is zero too
 
 
-def times(log: Log, column: int, unit: Unit | None, words: Iterable[str], faults: Faults) -> Times:
-    """The times of a column. Stamps and clocks are counted from the first row, other times are kept."""
+def times(
+    log: Log, column: int, unit: Unit | None, words: Iterable[str], faults: Faults, day: int | None = None
+) -> Times:
+    """The times of a column. Stamps and clocks are counted from the first row, other times are kept.
+
+    day    the column that holds the days of a clock
+    """
     if (unit and unit.is_clock) or (unit is None and is_text(log, column)):
-        seconds, start, zero = _clock(log, column, words, faults)
+        seconds, start, zero = _clock(log, column, words, faults, day)
         return Times(seconds, zero, named(CLOCK), unit is None, start)
     exact = _whole(log, column)
     values = numbers(log, column, words, faults) if exact is None else exact.astype(float)
@@ -165,9 +170,30 @@ def _whole(log: Log, column: int):
         return None
 
 
-def _clock(log: Log, column: int, words: Iterable[str], faults: Faults) -> tuple[Array, str, float]:
+def is_day_of_clock(log: Log, day: int, clock: int) -> bool:
+    """Whether a column holds the days of a clock, another column of times without days."""
+    if not (is_text(log, day) and is_text(log, clock)):
+        return False
+    alone, dated = (next(filter(None, _clock_texts(log, clock, with_day)), "") for with_day in (None, day))
+    is_clock = any(_moment(alone, form) for form in (*_CLOCKS, _MINUTES))
+    return is_clock and any(_moment(dated, form) for form in _FORMATS)
+
+
+def _clock_texts(log: Log, column: int, day: int | None) -> list[str]:
+    """The texts of a clock, each behind its date where another column holds that."""
+    raw = [_stripped(text) for text in log.values[column]]
+    if day is None:
+        return raw
+    return [f"{_stripped(date)} {text}" if text else "" for date, text in zip(log.values[day], raw, strict=True)]
+
+
+def _stripped(text: str) -> str:
+    return text.strip().strip("\"'")
+
+
+def _clock(log: Log, column: int, words: Iterable[str], faults: Faults, day: int | None) -> tuple[Array, str, float]:
     """Times since the first one [s], that one as it stands there, and it in seconds since 1970."""
-    raw = [text.strip().strip("\"'") for text in log.values[column]]
+    raw = _clock_texts(log, column, day)
     filled = [text for text in raw if not _is_missing(text, words)] or [""]
     first = filled[0]
     forms = [form for form in _FORMATS if _moment(first, form)]

@@ -19,7 +19,7 @@ from ctcr.intake.bodies import (
     settled,
 )
 from ctcr.intake.choices import GROUPS, Choices, group_of
-from ctcr.intake.fields import is_text
+from ctcr.intake.fields import is_day_of_clock, is_text
 from ctcr.intake.log import Log
 from ctcr.intake.names import INNER, MIDDLE, OUTER, TIP_WORDS
 from ctcr.intake.units import Unit
@@ -69,6 +69,11 @@ def of(log: Log, choices: Choices, n_tubes: int | None, poses: bool = True) -> M
         same = [one for one in candidates if one.meaning.role in ((role,) if axes else (role, "force"))]
         if role not in made.used and same:
             made.used[role] = picker.best(role, same)
+    days = [one for one in candidates if one.meaning.role == "date"]
+    if "t" in made.used and "date" not in made.used:
+        clock = made.used["t"].column
+        if days := [one for one in days if is_day_of_clock(log, one.column, clock)]:
+            made.used["date"] = picker.best("date", days)
     if poses:
         _poses(made, candidates, choices, picker)
         _check_whole(made, candidates, ignored, picker)

@@ -94,7 +94,8 @@ def times(columns: Columns) -> tuple[Array, float]:
     stated = used.unit if used.unit and used.unit.quantity else None
     asked = None if columns.beside and stated else asked
     unit = units.parsed(asked, "time", "--unit t") if asked else stated
-    read = fields.times(columns.log, used.column, unit, columns.choices.missing, columns.faults)
+    day = columns.mapping.used["date"].column if columns.has("date") else None
+    read = fields.times(columns.log, used.column, unit, columns.choices.missing, columns.faults, day)
     if columns.has("nsec"):
         read = _with_parts(columns, read)
     columns.units["t"] = read.unit, "values" if read.guessed else "option" if asked else used.how

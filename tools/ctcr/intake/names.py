@@ -20,6 +20,7 @@ def _set(words: str) -> set[str]:
 TIP_WORDS = _set("tip sensor probe ee effector end tool distal spitze")
 RUN = _set("run runs trial trials path experiment trajectory traj sequence messung versuch lauf bahn")
 _TIME = _set("t time times timestamp timestamps stamp datetime elapsed secs clock zeit zeitstempel uhrzeit")
+_DAY = _set("date datum")  # of the clock in another column
 _BETA = _set("beta betas b d trans translation translations translational linear lin ins insertion tr ext extension")
 _BETA |= _set("slide rho l s advance displacement disp stroke vorschub vortrieb weg verschiebung")
 _ALPHA = _set("alpha alphas a theta thetas rot rotation rotations rotational roll psi phi angle angles ang winkel")
@@ -225,7 +226,7 @@ def _joint(words: list[str]) -> Found:
 
 
 def _other(words: list[str]) -> Found:
-    known_words = ("t", _TIME), ("run", RUN), ("seen", _SEEN), ("weight", _WEIGHT), ("force", _FORCE)
+    known_words = ("t", _TIME), ("date", _DAY), ("run", RUN), ("seen", _SEEN), ("weight", _WEIGHT), ("force", _FORCE)
     for role, known in known_words:
         if set(words) & known:
             rest = [word for word in words if word not in known and not word.isdigit()]

@@ -11,7 +11,7 @@ from ctcr.table import measurements
 
 _HOW = {"format": "stated", "name": "guessed: name", "option": "option"}
 _UNIT_HOW = {"values": "guessed: unit", "option": "unit: option"}
-_OTHER = {"seen": "whether the pose counts", "nsec": "t_s (below 1 s)", "weight": "fx_N..fz_N"}
+_OTHER = {"seen": "whether the pose counts", "date": "t_s (the day)", "nsec": "t_s (below 1 s)", "weight": "fx_N..fz_N"}
 _OURS = {name.partition("_")[0]: name for name in measurements.column_names(9)}
 
 

@@ -22,7 +22,7 @@ def divided(choices: Choices, poses: Log, joints: Log) -> tuple[Choices, Choices
         def mine(name: str) -> bool:
             return log.find(name) is not None or log is poses and other.find(name) is None
 
-        times = ("t", "nsec")
+        times = ("t", "nsec", "date")
         named = choices.columns.items()
         columns = {r: n for r, n in named if (mine(n) if r in times else (r.rstrip("123456789") in MOVING) == wanted)}
         counts = "t" in choices.columns and choices.units.get("t", "")[:1].isdigit()
@@ -35,11 +35,12 @@ def divided(choices: Choices, poses: Log, joints: Log) -> tuple[Choices, Choices
     return part(poses, joints, False), of_joints.model_copy(update={"sensor": None, "relative_to": None})
 
 
-def at(columns: Columns, moving: Columns, moved: Motion, t: Array, zero: float) -> Motion:
+def at(columns: Columns, moving: Columns, moved: Motion, t: Array, zero: float, shift: float | None) -> Motion:
     """The motion of a log of joints in each row of a log of poses.
 
     By their times [s], between which joints move in straight lines; row by row where neither log has times. `zero` is
-    what the poses' clock shows at their t = 0, by the clock of the joints. Raises InputError where times do not meet.
+    what the poses' clock shows at their t = 0, and `shift` is added to their times. Clocks of two kinds (a date, a time
+    of day, or neither) begin at t = 0 of both tables and need a shift. Raises InputError where times do not meet.
     """
     rows, file = columns.log.rows, str(moving.log.path)
     timed = [np.isfinite(times).any() for times in (t, moved.t)]
@@ -47,6 +48,7 @@ def at(columns: Columns, moving: Columns, moved: Motion, t: Array, zero: float) 
         if len(rows) != len(moved.rows):
             text = f"has {len(moved.rows)} rows, the log of the poses {len(rows)}, and neither has times"
             raise InputError(Problem(text, file))
+        columns.notes.append(f"neither log has times: joints of {moving.log.path.name} are taken row by row")
         return replace(moved, rows=rows)
     if not all(timed):
         lacking, other = (moving, columns) if timed[0] else (columns, moving)
@@ -62,7 +64,12 @@ def at(columns: Columns, moving: Columns, moved: Motion, t: Array, zero: float) 
     if (np.diff(known.t) < 0).any():
         text = "its times run backwards: joints cannot be found by time"
         raise InputError(Problem(text, file, field=moving.name("t")))
-    clock = t + (zero - moved.zero)  # of the poses, by the clock of the joints
+    alike = np.sign(zero) == np.sign(moved.zero)  # a time of day counts from 1900, a date from 1970, others from 0
+    if not alike and shift is None:
+        text = "its clock is of another kind than that of the poses: say what to add to the times of the poses, where"
+        text += " times of day, and dates, count from the first row of their log, such as --offset t=12.5s"
+        raise InputError(Problem(text, file, field=moving.name("t")))
+    clock = t + (shift or 0.0) + (zero - moved.zero if alike else 0.0)  # of the poses, by the clock of the joints
     inside = (clock >= known.t[0]) & (clock <= known.t[-1])
     if not inside.any():
         span = f"{known.t[0]:g} to {known.t[-1]:g} s, those of the poses {np.nanmin(clock):g} to {np.nanmax(clock):g} s"
