@@ -8,7 +8,7 @@ from ctcr.diagnose import add as effects_added
 from ctcr.diagnose.add import Added
 from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.effects import catalogue
-from ctcr.effects.settings import found, settings
+from ctcr.effects.settings import found, named
 from ctcr.errors import InputError, Problem
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements, check_of
@@ -46,13 +46,8 @@ def add(
         ids = list(dict.fromkeys(catalogue.get(name, robot.n_tubes).id for name in names))
     if not ids:
         raise InputError(Problem("nothing was found to add" if isinstance(effects, Diagnosis) else "name an effect"))
-    fixed, start = ({**of, **_named(given or {}, robot, ids)} for of, given in ((held, fixed), (values, start)))
+    fixed, start = ({**of, **named(given or {}, robot, ids)} for of, given in ((held, fixed), (values, start)))
     readings, said, _ = to_fit(robot, table, anyway=anyway, frame_per_run=frame_per_run)
     added = effects_added.add(robot, readings, ids, fixed=fixed, start=start, free=free)
     added.notices[:0] = said
     return added
-
-
-def _named(values: Mapping[str, float], robot: Robot, ids: Sequence[str]) -> dict[str, float]:
-    """Values by full name."""
-    return settings((f"{name}={float(value)}" for name, value in values.items()), robot, ids)

@@ -1,7 +1,7 @@
-"""Values of the parameters of effects, as texts of the command line (delay=0.05) or in the answer of a diagnosis."""
+"""Values of the parameters of effects: as texts of the command line (delay=0.05), by name, or of a diagnosis."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -18,10 +18,26 @@ def settings(given: Iterable[str], robot: Robot, ids: Sequence[str] = ()) -> dic
     Without a tube the value is that of all tubes, or a list, one value a tube. Without a parameter it is that of the
     effect's only amplitude. With a single effect in `ids` its name may be left out. Raises InputError with all faults.
     """
+
+    def read(text: str) -> dict[str, float]:
+        key, sign, value = text.partition("=")
+        if not sign:
+            raise _fault(text, "needs NAME=VALUE, such as friction.coefficient=0.02")
+        return _one(key.strip(), value.split(","), text, robot.n_tubes, list(ids))
+
+    return _together(read, given)
+
+
+def named(given: Mapping[str, float], robot: Robot, ids: Sequence[str] = ()) -> dict[str, float]:
+    """Values by full name, SI, from those by the names that settings() takes. Raises InputError with all faults."""
+    return _together(lambda key: _one(key, [given[key]], f"{key}={given[key]:g}", robot.n_tubes, list(ids)), given)
+
+
+def _together(read: Callable[[str], dict[str, float]], given: Iterable[str]) -> dict[str, float]:
     found, problems = {}, []
     for text in given:
         try:
-            found |= _one(text, robot.n_tubes, list(ids))
+            found |= read(text)
         except InputError as error:
             problems += error.problems
     if problems:
@@ -55,11 +71,9 @@ def found(answer: Any, robot: Robot) -> tuple[list[str], dict[str, float], dict[
     return ids, held, values
 
 
-def _one(text: str, n_tubes: int, ids: list[str]) -> dict[str, float]:
-    key, sign, value = text.partition("=")
-    if not sign:
-        raise _fault(text, "needs NAME=VALUE, such as friction.coefficient=0.02")
-    parts = key.strip().split(".")
+def _one(key: str, values: Sequence[str | float], text: str, n_tubes: int, ids: list[str]) -> dict[str, float]:
+    """The values of a name by full name; `text` is what faults show."""
+    parts = key.split(".")
     parts = parts[1:] if parts[0] == "effects" else parts
     known = catalogue.all_effects(n_tubes)
     if len(ids) == 1 and parts[0] not in known:
@@ -84,18 +98,18 @@ def _one(text: str, n_tubes: int, ids: list[str]) -> dict[str, float]:
             tube = f"a tube from 1 to {n_tubes}" if parameter.per_tube else "no tube: it has one value"
             raise _fault(text, f"{parts[1]} needs {tube}")
         names = [name]
-    numbers = [_number(item, text, parameter) for item in value.split(",")]
+    numbers = [_number(item, text, parameter) for item in values]
     if len(numbers) not in (1, len(names)):
         raise _fault(text, f"needs one number, or {len(names)}")
     return dict(zip(names, numbers * (len(names) // len(numbers)), strict=True))
 
 
-def _number(item: str, text: str, parameter: catalogue.EffectParameter) -> float:
+def _number(item: str | float, text: str, parameter: catalogue.EffectParameter) -> float:
     unit = parameter.unit or "no unit"
     try:
         number = float(item)
     except ValueError:
-        raise _fault(text, f"{item.strip()!r} is not a number (in {unit})") from None
+        raise _fault(text, f"{str(item).strip()!r} is not a number (in {unit})") from None
     low, high = parameter.hard
     if not isfinite(number) or not low <= number <= high:
         raise _fault(text, f"{number:g} is impossible: {parameter.name} is {low:g} to {high:g} ({unit})")
