@@ -182,6 +182,7 @@ WRONG = [
     (lambda robot, table: ctcr.add(robot, "friction", None), "table: needs Measurements (of ctcr.read), not None"),
     (lambda robot, table: ctcr.add(robot, 3, table), "effects: needs Diagnosis or str or a list of str, not 3"),
     (lambda robot, table: ctcr.add(robot, "friction", table, fixed={"limit": 1}), "friction has no parameter limit"),
+    (lambda robot, table: ctcr.add(robot, "friction", table, fixed={"a=1,2": 1}), "friction has no parameter a=1,2"),
     (lambda robot, table: ctcr.add(robot, "friction", table, start=[1]), "start: needs a dict of float by str or None"),
     (lambda robot, table: ctcr.calibrate(robot, table, free=3), "free: needs str or a list of str, not 3"),
     (lambda robot, table: ctcr.calibrate(robot, table, free=[3]), "free: needs str or a list of str, not [3]"),
@@ -255,9 +256,8 @@ def test_doubts_of_a_table(robot, shuffled, tmp_path):
     for result in results:
         for text in (str(result), result._repr_html_()):
             assert text.count("does not come after") == text.count("a run continues") == 1
-        if hasattr(result, "report"):
-            result.report(page)
-            assert page.read_text().count("does not come after") == 1
+        result.report(page)
+        assert page.read_text().count("does not come after") == 1
     with pytest.raises(ctcr.WrongConventions, match="does not come after"):
         ctcr.calibrate(robot, replace(shuffled, alpha=shuffled.alpha * [1, -1, 1]))
 
@@ -327,6 +327,18 @@ def test_shown(robot, table, report, fit, found, better):
     assert "mm" in report._repr_html_() and "rad" in better._repr_html_()
     for result in (report, fit, found, better):
         assert isinstance(result.plot(), matplotlib.figure.Figure) and result.plot()._repr_svg_().startswith("<svg")
+
+
+def test_report_of_added_effects(run, better, file, tmp_path):
+    """The page of added effects says what they do to the error, and what was fitted; the command writes it too."""
+    page = tmp_path / "added.html"
+    better.report(page)
+    for text in ("<h2>The error falls</h2>", "Friction between the tubes", "effects.friction.coefficient.1", "<svg"):
+        assert text in page.read_text()
+    given = [DATA / "robot.yaml", "tip_load", "-o", tmp_path / "new.yaml", "--report", tmp_path / "command.html"]
+    assert run("add", *given)[0] == 2  # nothing is fitted
+    assert run("add", *given, "--fit", file, "--free", FEW)[0] == 0
+    assert "Input files" in (tmp_path / "command.html").read_text()
 
 
 def test_names_of_users(robot, table):

@@ -18,7 +18,7 @@ from ctcr.errors import InputError, Problem
 @options.anyway
 @options.frames
 @options.new_robot
-@options.json
+@options.outputs
 def command(robot, names, diagnosis, measurements, given, free, anyway, frame_per_run, target, in_place, out) -> None:
     """Add physical effects to a robot file.
 
@@ -46,6 +46,8 @@ def command(robot, names, diagnosis, measurements, given, free, anyway, frame_pe
         raise click.UsageError("name an effect: see ctcr effects")
     fixed = held | settings(given, loaded, ids)
     if not measurements:
+        if out.report:
+            raise click.UsageError("--report shows a fit: give --fit MEASUREMENTS")
         after = catalogue.with_values(loaded, ids, fixed)
         write_values(loaded, after, ids, target, in_place)
         out.write_json({"effects": after.effects})
@@ -56,6 +58,7 @@ def command(robot, names, diagnosis, measurements, given, free, anyway, frame_pe
     added = add(loaded, ids, readings, **given)
     added.save(target, in_place=in_place)
     out.write_json(added.as_dict())
+    out.write_page(added)
     _show(out, loaded, added)
     out.say(f"Robot file: {target}")
 

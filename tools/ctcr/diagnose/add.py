@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -33,7 +33,7 @@ from ctcr.robot import history, ledger
 from ctcr.robot.description import Robot
 from ctcr.robot.ledger import Change, Entry
 from ctcr.show.output import Progress
-from ctcr.show.result import Glance, Shown, frame, picture
+from ctcr.show.result import Glance, Result, frame, picture
 from ctcr.show.wording import deviation, number, sentence
 from ctcr.table.measurements import Measurements
 
@@ -44,8 +44,10 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class Added(Shown):
+class Added(Result):
     """Effects fitted to measurements."""
+
+    PAGE: ClassVar[str] = "diagnose.add_report"
 
     before: Robot  # as it was given
     after: Robot  # with them
@@ -59,8 +61,8 @@ class Added(Shown):
 
     @property
     def files(self) -> list[str]:
-        """Of the measurements."""
-        return self.readings.files
+        """Of the robot and of the measurements."""
+        return [*self.before.files, *self.readings.files]
 
     def parameters(self) -> dict[str, dict[str, float]]:
         """Value and standard deviation of every fitted parameter of an effect, SI."""
@@ -108,8 +110,7 @@ class Added(Shown):
 
     def plot(self) -> "Picture":
         """The error after each step, a matplotlib figure; `savefig` writes it."""
-        stages = [history.Stage(name, size, "") for name, size in self._errors()]
-        return picture(history.draw_waterfall, stages, 10.4, 4.4)
+        return picture(history.draw_waterfall, self.steps, 10.4, 4.4)
 
     def to_frame(self) -> "DataFrame":
         """A row a fitted parameter of an effect, SI."""
@@ -123,17 +124,20 @@ class Added(Shown):
             [name.removeprefix("effects."), known[name].unit, number(one["value"], one["sd"]), deviation(one["sd"])]
             for name, one in self.parameters().items()
         ]
-        errors = [f"{name}: {size:.3f} mm RMS" for name, size in self._errors()]
+        errors = [f"{step.name}: {step.rms_mm:.3f} mm RMS" for step in self.steps]
         steps = self.rms("rms_mm")
         fall = f"{steps['calibrated']:.3g} to {steps[self.ids[-1]]:.3g} mm RMS"
         line = f"Added {', '.join(self.ids)} to {self.before.name}: {fall}"
         notes = [*errors, *self.notices]
         return Glance(line, ["fitted (SI)", "unit", "value", "sd"], rows, notes, 2, self.readings.doubts)
 
-    def _errors(self) -> list[tuple[str, float]]:
-        """The RMS error [mm] of each step, the expected error last."""
-        steps = [(stage.name, stage.rms_mm) for stage in self.stages if stage.name != "noise_floor"]
-        return [*steps, (history.FLOOR, self.floors.expected_error_mm)]
+    @property
+    def steps(self) -> list[history.Stage]:
+        """The error of each step from the robot file on, the expected error last."""
+        found = [("robot file", self.stages[0].rms_mm)]
+        found += [(stage.name.replace("_", " "), stage.rms_mm) for stage in self.stages[1:-1]]
+        found.append((history.FLOOR, self.floors.expected_error_mm))
+        return [history.Stage(name, size, "") for name, size in found]
 
 
 def add(
@@ -207,7 +211,7 @@ def _change(added: Added) -> tuple[list[Change], Entry]:
     if np.isfinite([stage.rms_deg for stage in added.stages]).all():
         figures["rms_deg"] = added.rms("rms_deg")
     figures |= {"held_out": added.held_out, "parameters": added.parameters(), "effects_before": before.effects}
-    return changes, Entry(f"ctcr add {' '.join(added.ids)}", added.files, figures, " ".join(added.notices))
+    return changes, Entry(f"ctcr add {' '.join(added.ids)}", added.readings.files, figures, " ".join(added.notices))
 
 
 def write_values(before: Robot, after: Robot, ids: Sequence[str], target: str | Path, in_place: bool = False) -> Robot:

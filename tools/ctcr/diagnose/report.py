@@ -9,11 +9,14 @@ from ctcr.diagnose import figures, next_commands
 from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.diagnose.varying_coefficients import ADVICE
 from ctcr.effects import catalogue
+from ctcr.fit.result import Fit
 from ctcr.model import fields
+from ctcr.robot.description import Robot
 from ctcr.show import html_page
 from ctcr.show import scene as show
 from ctcr.show.html_page import as_html, cards, figure, paragraph, table
 from ctcr.show.wording import deviation, number, sentence, short
+from ctcr.table.sessions import Sessions
 
 MOST_ARROWS = 800
 ARROW_SHARE = 0.12  # of the workspace that a large error (95 %) may fill on the page
@@ -22,7 +25,7 @@ ARROW_SHARE = 0.12  # of the workspace that a large error (95 %) may fill on the
 def page(d: Diagnosis) -> str:
     """The whole HTML text."""
     title = f"Diagnosis: {d.robot.name}"
-    parts = [_found, _errors, _explanations, _varying, _view, _candidates, _next, _parameters, _limits]
+    parts = [_found, _errors, _explanations, _varying, _view, _candidates, _next, _fitted, _limits]
     sections = [_opening(d), *(part(d) for part in parts)]
     return html_page.page(title, sections, d.files)
 
@@ -124,10 +127,16 @@ def _next(d: Diagnosis) -> str:
     return f"<h2>What to measure next</h2>{_listed(advice)}{runs if ids else ''}"
 
 
-def _parameters(d: Diagnosis) -> str:
-    known, rows = catalogue.parameter_of(d.robot.n_tubes), []
-    for one in fields.fitted(d.final):
+def _fitted(d: Diagnosis) -> str:
+    return fitted_values(d.final, d.robot, d.measurements.sessions)
+
+
+def fitted_values(fit: Fit, robot: Robot, sessions: Sessions | None) -> str:
+    """The parameters of a fit, those of effects first, and what each run has of its own."""
+    known, rows, said = catalogue.parameter_of(robot.n_tubes), [], ""
+    for one in fields.fitted(fit):
         meaning = known[one.name].meaning if one.name in known else ""
+        meaning, said = "the same" if meaning and meaning == said else meaning, meaning
         values = number(one.value, one.sd), deviation(one.sd)
         rows.append([one.name, meaning, *values, one.unit, f"{one.shift:+.1f}"])
     rows.sort(key=lambda row: not row[0].startswith("effects."))
@@ -140,7 +149,7 @@ def _parameters(d: Diagnosis) -> str:
         "shift, prior sd": "fitted less robot file, in standard deviations that the robot file gives the value",
     }
     fitted = "<h2>Fitted values</h2>" + table("Effects first, then calibration", columns, rows, 2)
-    if sessions := d.measurements.sessions:
+    if sessions:
         fitted += table(sessions.TITLE, sessions.columns, sessions.rows(), 0)
     return fitted
 
