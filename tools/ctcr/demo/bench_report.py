@@ -58,7 +58,7 @@ def page(story: Story, hidden: Robot, drives: dict[str, Driven]) -> str:
         "Blue: the same processes as on a real bench. Brown: simulated; it answers in the bytes of the real devices, "
         "so that one line of the bench file replaces each by the real one."
     )
-    fall = figure(history.draw_waterfall, history.waterfall(found), 8.4, 3.8, "RMS error on held-out runs.")
+    fall = history.figure(history.waterfall(found), "RMS error on held-out runs.")
     sections = [
         _opening(story, found, drives),
         "<h2>The bench</h2>" + figure(bench_figures.bench, None, 10.4, 2.7, processes, wide=True),

@@ -86,9 +86,15 @@ def page(robot: Robot) -> str:
     lead = _lead(stages) if stages else "Nothing was changed yet." if not lines else ""
     sections = [html_page.paragraph(lead, "lead")]
     if stages:
-        sections.append(html_page.figure(draw_waterfall, stages, 10.4, 4.4, "RMS error after each step."))
+        sections.append(figure(stages, "RMS error after each step."))
     sections.append("<h2>Ledger</h2>" + html_page.table("Oldest first", COLUMNS, lines, len(COLUMNS)))
     return html_page.page(title, sections, robot.files)
+
+
+def figure(stages: list[Stage], caption: str) -> str:
+    """The waterfall on a page, as wide as its bars need."""
+    width = max(5.2, 1.2 * len(stages))
+    return html_page.figure(draw_waterfall, stages, width, 3.4, caption, wide=width > 6)
 
 
 def _lead(stages: list[Stage]) -> str:
@@ -100,13 +106,14 @@ def _lead(stages: list[Stage]) -> str:
 def draw_waterfall(figure, stages: list[Stage]) -> None:
     """A bar a stage, and the expected error as a line."""
     axes = figure.subplots()
+    line = stages[-1].rms_mm if stages[-1].name == FLOOR else 0.0
     above = {"textcoords": "offset points", "ha": "center", "fontweight": "bold"}
     for x, (before, stage) in enumerate(zip([None, *stages], stages, strict=False)):
         colour = NOISE if stage.name == FLOOR else OUT if before else ERROR
         axes.bar(x, stage.rms_mm, width=0.62, color=colour)
-        axes.annotate(f"{stage.rms_mm:.3g}{_change(before, stage)}", (x, stage.rms_mm), (0, 3), **above)
-    if stages[-1].name == FLOOR:
-        axes.axhline(stages[-1].rms_mm, color=NOISE, ls="--", lw=1)
+        axes.annotate(f"{stage.rms_mm:.3g}{_change(before, stage)}", (x, max(stage.rms_mm, line)), (0, 3), **above)
+    if line:
+        axes.axhline(line, color=NOISE, ls="--", lw=1)
     axes.set_xticks(range(len(stages)), [visible(stage.name).replace(" ", "\n", 1) for stage in stages])
     axes.set(ylabel="error, mm RMS", ylim=(0, 1.14 * max(stage.rms_mm for stage in stages)))
     axes.grid(axis="x", visible=False)
