@@ -232,6 +232,8 @@ def test_errors(run, arguments, message):
         (["shape", ROBOT, "--beta-mm", "-300,-200,-100", "--alpha-deg", "0,0"], "--alpha-deg: needs 3 numbers"),
         (["shape", ROBOT, "--beta-mm", "-3e5,-2e5,-1e5", "--alpha-deg", "0,0,0"], "--beta-mm: -300 m: is this mm?"),
         (["shape", ROBOT, "--beta-mm", "a,b", "--alpha-deg", "0,0,0"], "is not a list of finite numbers"),
+        (["shape", ROBOT, "--beta-mm", "-330,5,-240,5,-165,5", "--alpha-deg", "0,0,0"], "such as -12.5"),
+        (["shape", ROBOT, "--beta-mm", "-330,5;-240,5;-165,5", "--alpha-deg", "0,0,0"], "such as 90,0,-30.5: commas"),
         (["compare", "r.yaml", "t.csv", "--json", "a", "--report", "a"], "a is also that of '--json'"),
         (["predict", "r.yaml", "t.csv", "-o", "t.csv"], "t.csv is also that of"),
         (["devices", "--bench", "b.yaml", "--json", "b.yaml"], "b.yaml is also that of '--bench'"),

@@ -53,7 +53,7 @@ class Numbers(click.ParamType):
         try:
             return [Finite().convert(part, param, ctx) for part in value.split(",")]
         except click.BadParameter:
-            self.fail(f"{value!r} is not a list of finite numbers such as 90,0,-30", param, ctx)
+            self.fail(f"{value!r} is not a list of finite numbers such as 90,0,-30.5: commas separate them", param, ctx)
 
 
 def joints(required: bool):
@@ -75,7 +75,9 @@ def array(option: str, values: list[float], count: int):
     from ctcr.errors import ArgumentError, Problem
 
     if len(values) != count:
-        raise ArgumentError(Problem(f"needs {count} numbers, separated by commas", field=option))
+        raise ArgumentError(
+            Problem(f"needs {count} numbers such as -12.5, separated by commas, not {len(values)}", field=option)
+        )
     return np.array(values)
 
 
