@@ -160,7 +160,9 @@ def _halves(c: Calibration) -> str:
         f"Two models, each fitted to half of the {h.kind}, differ by {mm(h.rms_mm)} RMS over the joints visited. "
         f"Noise alone would make it {mm(h.noise_mm)}, {verdict}."
     )
-    caption = "Left, middle: where the two disagree. Right: against what noise can do (line) and twice that (dashed)."
+    caption = (
+        "Left, middle: where the two disagree. Right: by how much, against what noise explains (line; dashed: twice)."
+    )
     picture = figure(figures.half_difference, c, WIDE, 4.6, caption, wide=True)
     return f"<h2>Two halves of the data</h2>{paragraph(text)}{picture}"
 

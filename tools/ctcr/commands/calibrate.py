@@ -119,7 +119,9 @@ def rotation_offset(
 @click.argument("points", type=options.read)
 @_length("--placement-sd-mm", 0.0, "Standard deviation of the probe from a CAD point, per axis; 0: from the residuals.")
 @_live
-@options.reads("--cad", "CAD.csv", "With --live: names and coordinates of the points, columns as POINTS.")
+@options.reads(
+    "--cad", "CAD.csv", "With --live: file with the names and coordinates of the points, in the columns of POINTS."
+)
 @options.setting("--rounds", click.IntRange(1), 1, "With --live: rounds over all points.")
 @_procedure
 def registration(
@@ -234,7 +236,7 @@ def cantilever(table: str, deflection_sd_mm, free_length_sd_mm, diameter_sd_mm, 
 def curvature(table: str, **others) -> None:
     """Curvature and curved length of a tube from points along its picture.
 
-    TABLE: x_px, y_px (or x_mm, y_mm) along the tube, in any order, over the curved part and some of the straight one.
+    TABLE: x_px, y_px (or x_mm, y_mm) along the tube, in any order, over the curved part and some of the straight part.
 
     Example: ctcr calibrate curvature picture.csv --robot robot.yaml --tube 2 --mm-per-px 0.0833 -o new.yaml
     """

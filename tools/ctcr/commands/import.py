@@ -41,7 +41,10 @@ _list_option = partial(options.repeated, callback=_names)
 @click.option("--columns", "listed", metavar="ROLES", help="Roles of all columns in their order; - for none, m1..m16.")
 @_list_option("--ignore", "ignore", "NAME", "A column that must not be used.")
 @_pair_option(
-    "--unit", "units", "ROLE=UNIT", "Unit of alpha1, alpha, beta, position, force, t, euler; 0.01mm: a count."
+    "--unit",
+    "units",
+    "ROLE=UNIT",
+    "Unit of alpha1, alpha, beta, position, force, t or euler; 0.01mm: the size of a count.",
 )
 @_list_option("--missing", "missing", "WORD", "A further word or number for a missing value.")
 @click.option(

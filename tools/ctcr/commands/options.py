@@ -115,10 +115,13 @@ measurements = click.argument("measurements", type=read)
 folder_name = click.option(
     "--folder",
     metavar="FOLDER",
-    help="Where the processes of a bench meet (mode 0700); default: a folder of this user.",
+    help="Folder where the processes of one bench meet (mode 0700); default: one of this user's.",
 )
 steps = setting(
-    "--steps", click.IntRange(1, 1000), 4, "Factor on the integration steps; more are slower, more accurate."
+    "--steps",
+    click.IntRange(1, 1000),
+    4,
+    "Factor on the number of integration steps: more steps are slower and more accurate.",
 )
 threads = setting("--threads", click.IntRange(0), 0, "Threads; 0: one per core.")
 seed = setting("--seed", click.IntRange(min=0), 1, "Seed of the random numbers: the same seed gives the same result.")

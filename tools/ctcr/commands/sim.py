@@ -56,7 +56,7 @@ def aurora(robot, folder, scenario, seed, **physics) -> None:
 def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
     """Simulate a coupler EK1100 and stepper terminals, which answer EtherCAT frames on a network interface.
 
-    Needs the rights of docs/hardware.md; `ctcr sim bench` needs none.
+    Needs the permissions that docs/hardware.md lists; `ctcr sim bench` needs none.
 
     Example: ctcr sim ethercat --interface eth1 --motors 6
     """
@@ -81,7 +81,7 @@ def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
 def bench(robot, program, folder, tracker_scenario, bus_scenario, seed, **physics) -> int:
     """Simulate a whole bench around ROBOT while COMMAND runs (default: a shell); its motors move the tracked tip.
 
-    Needs no rights: bus and COMMAND get a network of their own.
+    Needs no special permissions: the bus and COMMAND get a network of their own.
 
     Example: ctcr sim bench robot.yaml --hide friction.coefficient=0.02 -- ctcr devices --bench bench.yaml
     """

@@ -15,7 +15,7 @@ Table = tuple[str, Mapping[str, str], list[list[str]], int]  # title, columns, r
 SIZES = {
     "mean": "mean distance between measured and predicted",
     "RMS": "root mean square of it",
-    "95 %": "95 of 100 are below",
+    "95 %": "95 of 100 errors are smaller",
     "max": "the largest",
 }
 

@@ -71,9 +71,7 @@ def _explanations(d: Diagnosis) -> str:
 def _errors(d: Diagnosis) -> str:
     left = figure(figures.waterfall, d, 5.2, 3.8, "RMS error on held-out readings.")
     right = figure(figures.course, d, 5.2, 3.8, "The error of every reading, in the order measured.")
-    text = (
-        "The error after calibration over the quantities that predict it best, and its part that the effects explain."
-    )
+    text = "The error after calibration against the quantities that predict it best; the part that the effects explain."
     more = figure(figures.before_after, d, 10.4, 3.6, text, True)
     heading = "The error falls" if d.accepted and not d.verdict.names_no_cause else "The errors"
     return f'<h2>{heading}</h2><div class="pair">{left}{right}</div>{more}'

@@ -99,7 +99,7 @@ def figure(stages: list[Stage], caption: str) -> str:
 
 def _lead(stages: list[Stage]) -> str:
     steps = [stage for stage in stages if stage.name != FLOOR]
-    floor = f"; a right model would err by {stages[-1].rms_mm:.3g} mm" if stages[-1].name == FLOOR else ""
+    floor = f"; {stages[-1].rms_mm:.3g} mm are expected of a right model" if stages[-1].name == FLOOR else ""
     return f"The error fell from {steps[0].rms_mm:.3g} to {steps[-1].rms_mm:.3g} mm RMS{floor}."
 
 

@@ -55,7 +55,9 @@ def _footer(files: Sequence[str]) -> str:
     made = f"Made by ctcr {version('ctcr')} on {date.today().isoformat()}"
     way = paragraph(f"{made}:") + command(shlex.join(["ctcr", *given])) if given else paragraph(f"{made} in Python.")
     rows = [[file, _digits(file)] for file in dict.fromkeys([*files, *inputs.shared])]
-    read = table("Input files", {"file": "", "SHA-256": f"its first {SHORT} digits: sha256sum FILE gives all"}, rows, 2)
+    read = table(
+        "Input files", {"file": "", "SHA-256": f"the first {SHORT} digits; sha256sum FILE prints all of them"}, rows, 2
+    )
     return f"<footer>{way}{read if rows else ''}</footer>"
 
 
