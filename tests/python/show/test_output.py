@@ -80,8 +80,8 @@ def test_read_only_folder():
 
 def test_absent_folder(tmp_path):
     """A folder that is absent, or stands where the file should."""
-    for path in (tmp_path / "absent" / "a.txt", tmp_path):
-        with pytest.raises(InputError, match="cannot write it"), output.atomic_writer(path) as file:
+    for path, why in ((tmp_path / "absent" / "a.txt", "make the folder .*absent first"), (tmp_path, "it is a folder")):
+        with pytest.raises(InputError, match=f"cannot write it: {why}"), output.atomic_writer(path) as file:
             file.write("x")
 
 

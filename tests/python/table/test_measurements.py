@@ -161,6 +161,12 @@ def test_header(faults, change, field, message):
     assert any(p.field == field and message in p.message and p.line == 1 for p in faults(change(header) + "\n" + rest))
 
 
+def test_log_of_another_form(faults):
+    """What has no joints as the format names them gets one advice, not a fault a column."""
+    (found,) = faults("tiempo (s),avance 1,avance 2,avance 3,giro 1,giro 2,giro 3,x,y,z\n" + ",".join("1" * 10))
+    assert found.line == 1 and "beta1_m to alpha3_rad: if it is a log, ctcr import" in found.message
+
+
 @pytest.mark.parametrize("table_tubes, robot_tubes", [(3, 2), (2, 3)])
 def test_other_robot(faults, table_tubes, robot_tubes):
     """A table of a robot with another number of tubes."""

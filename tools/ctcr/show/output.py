@@ -36,6 +36,8 @@ def atomic_writer(path: str | Path, binary: bool = False) -> Iterator[IO]:
     mode = {"mode": "wb"} if binary else {"mode": "w", "encoding": "utf-8", "newline": "\n"}
     if target.is_dir():
         raise InputError(Problem("cannot write it: it is a folder", str(path)))
+    if not target.parent.exists():
+        raise InputError(Problem(f"cannot write it: make the folder {Path(path).parent} first", str(path)))
     special = target.exists() and not target.is_file()  # /dev/null and the like are written, never replaced
     temporary = None
     try:

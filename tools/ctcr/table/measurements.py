@@ -259,6 +259,10 @@ def _groups(table: Table, n_tubes: int) -> dict[str, list[int]]:
     groups, file = group_columns(n_tubes), str(table.path)
     unknown = {column: _unknown(column, table.columns, n_tubes) for column in table.columns}
     meant = {near for _, near in unknown.values()}
+    joints = [*groups["beta"], *groups["alpha"]]
+    if not {*joints} & {*table.columns, *table.index, *meant}:
+        text = f"has none of the columns {joints[0]} to {joints[-1]}: if it is a log, ctcr import makes a table of it"
+        raise InputError(Problem(text, file, 1, line_name="row"))
     missing = {column: text for column, text in _missing(table.columns, groups, n_tubes) if column not in meant}
     known = {name for names in groups.values() for name in names}
     index = [name for name in table.index if name in known and name not in table.columns]
