@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Peak memory of the compiler for programs of users. Unlike times, it does not depend on the load of the machine.
 
-Compiles with -O2 for AVX2, plainly and with CTCR_FAST_COMPILE. Exit code 1 when a program takes over GROWTH more than
-it did."""
+Compiles with -O2 for AVX2: plainly, with CTCR_FAST_COMPILE, and with the solver in a file of its own (ctcr::solver_3).
+Exit code 1 when a program takes over GROWTH more than it did."""
 
 import os
 import subprocess
@@ -22,12 +22,15 @@ ctcr::Status one_step(const ctcr::Model<3>& model, const ctcr::Joints<3>& q, ctc
 CONTROL = (ROOT / "examples" / "03_control.cpp").read_text()
 FLAGS = ["-std=c++20", "-O2", "-march=x86-64-v3", "-ffp-contract=fast", "-Wno-psabi", "-c", "-x", "c++"]
 FAST = "-DCTCR_FAST_COMPILE"
+SOLVER = "-DCTCR_SOLVER_3"  # ctcr::solver_3: the solver stands in a file of its own
 COMPILER = "g++ (Debian 12.2.0-14+deb12u1) 12.2.0"  # that the figures are of
 PROGRAMS = {  # MB
     "step() of 3 tubes": (STEP, [], 658),
     "step() of 3 tubes, fast compile": (STEP, [FAST], 546),
+    "step() of 3 tubes, compiled solver": (STEP, [SOLVER], 408),
     "examples/03_control.cpp": (CONTROL, [], 1208),
     "examples/03_control.cpp, fast compile": (CONTROL, [FAST], 813),
+    "examples/03_control.cpp, compiled solver": (CONTROL, [SOLVER], 610),
 }
 
 

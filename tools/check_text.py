@@ -4,7 +4,7 @@ import re
 import sys
 from pathlib import Path
 
-FOLDERS = ("include", "tests", "bench", "tools", "examples", "docs", "cmake", ".ci")
+FOLDERS = ("include", "src", "tests", "bench", "tools", "examples", "docs", "cmake", ".ci")
 TEXT = {".hpp", ".cpp", ".py", ".sh", ".cmake", ".md", ".txt", ".toml", ".yaml", ".json", ""}
 FORBIDDEN = {
     "absolute path of one machine": re.compile(r"(?<![\w.~}/])/(?:home|root|tmp|work|Users)/"),

@@ -523,3 +523,7 @@ CTCR_NOINLINE Status step(const Model<N, Fx>& model, const Joints<N>& q, const T
 }
 
 }  // namespace ctcr
+
+#if defined(CTCR_SOLVER_1) || defined(CTCR_SOLVER_2) || defined(CTCR_SOLVER_3) || defined(CTCR_SOLVER_4)
+#include "ctcr/mechanics/solver_instances.hpp"
+#endif
