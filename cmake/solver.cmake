@@ -23,5 +23,6 @@ install(TARGETS ${solvers} EXPORT ctcr-targets)
 if(CTCR_BUILD_TESTS OR CTCR_BUILD_EXAMPLES)
   add_library(ctcr_own_solver STATIC)
   target_link_libraries(ctcr_own_solver PRIVATE ${solvers} ctcr_fast_compile INTERFACE ctcr::ctcr)
+  set_target_properties(ctcr_own_solver PROPERTIES UNITY_BUILD OFF)  # side by side, and in less memory
   target_compile_definitions(ctcr_own_solver INTERFACE CTCR_SOLVER_1 CTCR_SOLVER_2 CTCR_SOLVER_3 CTCR_SOLVER_4)
 endif()
