@@ -24,7 +24,8 @@ KEPT = ROOT / "docs" / "diagnosis_scores.md"
 ABOUT = """Sets with hidden effects from the independent oracle (`tools/oracle`), diagnosed by the command line from
 robot file and measurements alone. %s `jitter`: noise of single readings;
 `realistic`: with the tracker's smooth field error and outliers too. The floor is that of the true noise, to which
-the unequal lags of single readings belong where a delay is hidden. %s"""
+the unequal lags of single readings belong where a delay is hidden.
+%s"""
 TUNED = "Thresholds were set on the tuning half."
 UNSEEN = """Other seeds than those by which thresholds were set, scored once
 (`python tools/oracle/make_suite.py --shift K --out FOLDER`)."""
