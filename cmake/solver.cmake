@@ -1,5 +1,5 @@
-# ctcr::solver_1 to ctcr::solver_4: the solver for robots of so many tubes without effects becomes a file of the program that
-# links the target, with its flags. Programs that ask for it compile in a fifth of the time
+# ctcr::solver_1 to ctcr::solver_4: the solver for robots of so many tubes, without effects, becomes a source file of the
+# program that links the target, and takes its flags. The other files then only call it, and compile in a fifth of the time
 # (include/ctcr/mechanics/solver_instances.hpp).
 include(GNUInstallDirs)
 
@@ -10,11 +10,13 @@ foreach(tubes 1 2 3 4)
   add_library(${target} INTERFACE)
   add_library(ctcr::solver_${tubes} ALIAS ${target})
   target_link_libraries(${target} INTERFACE ctcr::ctcr)
-  target_compile_definitions(${target} INTERFACE CTCR_SOLVER_${tubes})
+  set(definition CTCR_SOLVER_${tubes})
+  target_compile_definitions(${target} INTERFACE ${definition})
   target_sources(${target} INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src/${source}>
                                      $<INSTALL_INTERFACE:$<INSTALL_PREFIX>/${solver_sources}/${source}>)
   set_target_properties(${target} PROPERTIES EXPORT_NAME solver_${tubes})
   list(APPEND solvers ${target})
+  list(APPEND definitions ${definition})
   install(FILES src/${source} DESTINATION ${solver_sources})
 endforeach()
 install(TARGETS ${solvers} EXPORT ctcr-targets)
@@ -24,5 +26,5 @@ if(CTCR_BUILD_TESTS OR CTCR_BUILD_EXAMPLES)
   add_library(ctcr_own_solver STATIC)
   target_link_libraries(ctcr_own_solver PRIVATE ${solvers} ctcr_fast_compile INTERFACE ctcr::ctcr)
   set_target_properties(ctcr_own_solver PROPERTIES UNITY_BUILD OFF)  # side by side, and in less memory
-  target_compile_definitions(ctcr_own_solver INTERFACE CTCR_SOLVER_1 CTCR_SOLVER_2 CTCR_SOLVER_3 CTCR_SOLVER_4)
+  target_compile_definitions(ctcr_own_solver INTERFACE ${definitions})
 endif()

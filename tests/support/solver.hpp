@@ -13,10 +13,6 @@
   kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&,           \
                                               Mat6&) noexcept;
 
-#define CTCR_TEST_DECLARE(KIND, N)                                                          \
-  CTCR_TEST_##KIND(extern template, none, N) CTCR_TEST_##KIND(extern template, jacobian, N) \
-      CTCR_TEST_##KIND(extern template, compliance, N)
-
 namespace ctcr {
 namespace test {
 /// Settings::accuracy with which solves integrate in the steps they are told to: for laws of the discrete map.
@@ -24,8 +20,12 @@ inline constexpr double as_told = std::numeric_limits<double>::infinity();
 }  // namespace test
 
 CTCR_SOLVER_WITH(extern template, compliance, 5)
-CTCR_TEST_DECLARE(DIRECT, 2)
-CTCR_TEST_DECLARE(DIRECT, 3)
+CTCR_TEST_DIRECT(extern template, none, 2)
+CTCR_TEST_DIRECT(extern template, jacobian, 2)
+CTCR_TEST_DIRECT(extern template, compliance, 2)
+CTCR_TEST_DIRECT(extern template, none, 3)
+CTCR_TEST_DIRECT(extern template, jacobian, 3)
+CTCR_TEST_DIRECT(extern template, compliance, 3)
 CTCR_TEST_PARAMETERS(extern template, all, 1)
 CTCR_TEST_PARAMETERS(extern template, all, 2)
 CTCR_TEST_PARAMETERS(extern template, all, 3)

@@ -146,10 +146,10 @@ Status differentiate_loaded(const Robot<N>& robot, const Workspace<N>& ws, int t
 template <class Stepper = MagnusRk4, int N>
 CTCR_NOINLINE Status differentiate_tip(const Model<N>& model, const Workspace<N>& ws, int tube,
                                        TipDerivatives<N>& out) noexcept {
-  if (tube < 0 || tube >= N) return out = {}, Status::invalid_settings;
-  Status status = Status::not_converged;
+  const bool exists = tube >= 0 && tube < N;
+  Status status = exists ? Status::not_converged : Status::invalid_settings;
   const bool loaded = !model.robot().gravity.isZero(0.0) || !ws.load.force.isZero(0.0) || !ws.load.moment.isZero(0.0);
-  if (!ws.warm)
+  if (!exists || !ws.warm)
     out = {};
   else if (loaded)
     status = detail::differentiate_loaded<Stepper>(model.robot(), ws, tube, out, nullptr);
@@ -165,8 +165,9 @@ CTCR_NOINLINE Status differentiate_tip(const Model<N>& model, const Workspace<N>
 template <class Stepper = MagnusRk4, int N>
 CTCR_NOINLINE Status differentiate_tip(const Model<N>& model, const Workspace<N>& ws, int tube, TipDerivatives<N>& out,
                                        Mat6& compliance) noexcept {
-  Status status = tube < 0 || tube >= N ? Status::invalid_settings : Status::not_converged;
-  if (status == Status::not_converged && ws.warm) {
+  const bool exists = tube >= 0 && tube < N;
+  Status status = exists ? Status::not_converged : Status::invalid_settings;
+  if (exists && ws.warm) {
     status = detail::differentiate_loaded<Stepper>(model.robot(), ws, tube, out, &compliance);
     if (out.by_joints.allFinite() && out.by_parameters.allFinite() && compliance.allFinite()) return status;
     status = Status::not_finite;

@@ -106,7 +106,7 @@ def _candidates(d: Diagnosis) -> str:
     drawn = figure(figures.candidates, d, 10.4, 4.4 * -(-len(d.rounds) // figures.PANELS), text, True)
     text = (
         "Fraction of a candidate's signal that another one can imitate together with calibration: where it is near 1 "
-        "both ways, these data cannot tell the two apart."
+        "both ways, these data can hardly tell the two apart."
     )
     apart = figure(figures.overlap, d, 5.2, 4.2, text)
     why = (f"Round {number}. {r.why_not}" for number, r in enumerate(d.rounds, start=1) if r.why_not)
