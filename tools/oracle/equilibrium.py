@@ -47,7 +47,7 @@ def solve_pose(
         x = solve(energy, guess, load.moment)
         coarser = energy, x
         twists.append(tip_pose(energy, x, tube))
-    return _extrapolate(twists, refinements)
+    return extrapolated(twists, refinements)
 
 
 def solve(energy: Energy, guess: np.ndarray, moment: np.ndarray) -> np.ndarray:
@@ -132,7 +132,7 @@ def turned(frame: np.ndarray, angle: float) -> np.ndarray:
     return frame @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _extrapolate(poses: list[Pose], refinements: tuple[int, ...]) -> Pose:
+def extrapolated(poses: list[Pose], refinements: tuple[int, ...]) -> Pose:
     """Polynomial in h^2 through the poses, at h = 0; the rotation is projected back onto SO(3)."""
     h2 = 1.0 / np.square(np.array(refinements, dtype=float))
     weights = [np.prod([other / (other - own) for other in h2 if other != own]) for own in h2]

@@ -96,11 +96,16 @@ class Configuration:
 
 
 def configure(
-    mechanics: Mechanics, beta: np.ndarray, alpha: np.ndarray, element_length: float, time: float = 0.0
+    mechanics: Mechanics,
+    beta: np.ndarray,
+    alpha: np.ndarray,
+    element_length: float,
+    time: float = 0.0,
+    refinement: int = 1,
 ) -> Configuration:
-    """Elements of at most element_length [m] and their properties at joints beta (N,) [m], alpha (N,) [rad]."""
+    """The grid of make_grid() and the properties of its elements at joints beta (N,) [m], alpha (N,) [rad]."""
     robot, warmth = mechanics.robot, mechanics.warming(time)
-    grid = make_grid(robot, beta, element_length)
+    grid = make_grid(robot, beta, element_length, refinement)
     joints = {int(grid.tip_node[i]): joint for i, joint in mechanics.sleeve.items() if grid.tip_node[i] > 0}
     if mechanics.entry:
         joints[0] = mechanics.entry

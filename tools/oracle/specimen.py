@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 from bore import loose_pose
-from equilibrium import Pose, turned
+from equilibrium import Pose, extrapolated, turned
 from grid import COINCIDENT
 from kernel import Problem
 from mechanics import Configuration, Mechanics, configure
@@ -21,10 +21,16 @@ Place = tuple[int, str, int]  # inner tube of the pair; "plate", "start" or "tip
 
 
 class Specimen:
-    """Starts at rest, without friction torque and with virgin material, at the first joint position it is given."""
+    """Starts at rest, without friction torque and with virgin material, at the first joint position it is given.
 
-    def __init__(self, mechanics: Mechanics, element_length: float, sensor_tube: int = 0) -> None:
+    Without history the poses are extrapolated over the refinements of the element length [m].
+    """
+
+    def __init__(
+        self, mechanics: Mechanics, element_length: float, sensor_tube: int = 0, refinements: tuple[int, ...] = (1, 2)
+    ) -> None:
         self.mechanics, self._element_length, self._sensor = mechanics, element_length, sensor_tube
+        self._refinements = (1,) if mechanics.has_history else refinements  # a history belongs to one grid
         self._anchor: dict[Place, np.ndarray] = {}
         self._jump: dict[Place, float] = {}
         self._fibres = [np.zeros((round(tube.length / FIBRE) + 1, 2)) for tube in mechanics.robot.tubes]
@@ -41,7 +47,14 @@ class Specimen:
             if key not in self._loose:
                 self._loose[key] = loose_pose(mechanics.robot, beta, alpha, force, mechanics.bore_gap, self._sensor)
             return self._loose[key]
-        here = configure(mechanics, beta, alpha, self._element_length, time)
+        poses = [self._equilibrium(beta, alpha, force, time, refinement) for refinement in self._refinements]
+        return extrapolated(poses, self._refinements)
+
+    def _equilibrium(
+        self, beta: np.ndarray, alpha: np.ndarray, force: np.ndarray, time: float, refinement: int
+    ) -> Pose:
+        mechanics = self.mechanics
+        here = configure(mechanics, beta, alpha, self._element_length, time, refinement)
         history = self._history(here, beta) if mechanics.has_history else {}
         problem = here.problem(force, **history)
         x = problem.minimise(self._guess(here, problem, alpha))
