@@ -70,3 +70,20 @@ def test_initial_history(engine, plan, from_home):
     assert taken.revise_initial_history(fit) is not from_home
     assert taken.measurements.from_home is from_home
     assert not taken.revise_initial_history(taken.fit(play))
+
+
+def test_jitter_is_no_field(engine):
+    """What the field error may explain as well as an effect does not draw the effect to the jitter: over some sessions
+    its z-scores are those of noise. At measured positions their mean is 2.5."""
+    robot, readings = engine.robot, engine.measurements
+    distortion = ["effects.field_distortion.scale"]
+    scores = []
+    for seed in range(6):
+        noisy = simulation.simulate(robot, readings, "jitter", seed=seed)
+        one = Engine(robot, noisy, noise_of_readings(robot, noisy), noisy.measured, threads=1)
+        fit = one.fit_with_field([], {})
+        full = one.fit([], start=values_of(fit), near=True)
+        column, (left, jacobian) = full.whiten(one.derivatives(full, distortion))[:, 0], full.whitened()
+        column -= jacobian @ np.linalg.lstsq(jacobian, column)[0]
+        scores.append(column @ left / np.linalg.norm(column))
+    assert abs(np.mean(scores)) < 3 / np.sqrt(len(scores))

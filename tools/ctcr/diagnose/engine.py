@@ -69,6 +69,7 @@ class Engine:
         fixed: dict[str, float] | None = None,
         weights: Array | None = None,
         noise: Any = None,
+        positions: Array | None = None,
         tolerance: float | None = None,
         near: bool = False,
         like: ResidualModel | None = None,
@@ -78,9 +79,9 @@ class Engine:
 
         near: the start is the optimum of a similar fit, so that a first fit to a part of many rows is not needed.
         like: the model of a similar fit; the rows start from its equilibria.
-        Frozen `weights` of outliers and `inflation` of the noise make log evidences comparable. Without them the fit
-        estimates both. Where the model is wrong, it inflates the noise, so that the calibration stays plausible.
-        Other options as in fit_joint().
+        Frozen `weights` of outliers and `inflation` of the noise, at the same `positions` of the sensor, make log
+        evidences comparable. Without them the fit estimates both. Where the model is wrong, it inflates the noise, so
+        that the calibration stays plausible. Other options as in fit_joint().
         """
         names = [*self.base, *added]
         priors = replace(Priors.of(self.robot, names, self.measurements.beta[self.rows]), scales=self._scales)
@@ -94,7 +95,8 @@ class Engine:
             weights = np.ones((len(self.measurements), 2))
         options |= {"start": at, "weights": weights, "tolerance": tolerance or self.tolerance, "few_first": not near}
         options["row"] = self.measurements.row
-        fitted = joint.fit_joint(table, priors, noise or self.noise, self.positions, self.fitted, **options)
+        positions = self.positions if positions is None else positions
+        fitted = joint.fit_joint(table, priors, noise or self.noise, positions, self.fitted, **options)
         self._equilibria = table
         if table.friction_is_solved:
             self._friction_path = table
@@ -105,15 +107,17 @@ class Engine:
     def fit_like(
         self, other: joint.Fit, added: Iterable[str] = (), start: dict[str, float] | None = None, **options: Any
     ) -> joint.Fit:
-        """Like fit(), with the noise, weights and inflation of another fit, so that their log evidences can be
-        compared. It starts at the values of that fit, or at `start`, which lies near them."""
-        options = {"noise": other.noise, "near": True, "like": other.model} | other.frozen | options
+        """Like fit(), with the noise, positions, weights and inflation of another fit, so that their log evidences can
+        be compared. It starts at the values of that fit, or at `start`, which lies near them."""
+        same = {"noise": other.noise, "positions": other.positions, "near": True, "like": other.model}
+        options = same | other.frozen | options
         return self.fit(added, start=values_of(other) if start is None else start, **options)
 
     def fit_with_field(
         self, added: Sequence[str], start: dict[str, float], fixed: dict[str, float] | None = None
     ) -> joint.Fit:
-        """Like fit(), with the fraction of the tracker's stated field error that makes the readings likeliest."""
+        """Like fit(), with the fraction of the tracker's stated field error that makes the readings likeliest, at the
+        positions that the fit predicts; later fits take these."""
 
         def again(values: Array, like: joint.Fit | None) -> joint.Fit:
             from_there = dict(zip(full.names, map(float, values), strict=True))
@@ -123,15 +127,15 @@ class Engine:
 
         full = self.fit(added, start=start, fixed=fixed)
         full = one_sided.restarted(full, again)
-        noise = joint.likeliest_field(full)
+        self.positions = full.predicted_positions()
+        noise = joint.likeliest_field(full, self.positions)
         # Fitted anew, not linearised: far from the full model's values effects are not linear.
-        if noise is full.noise:
-            return full
         return self.fit(added, start=values_of(full), fixed=fixed, noise=noise, first_weights=full.weights, near=True)
 
     def continued(self, fit: joint.Fit, fixed: dict[str, float] | None = None) -> joint.Fit:
         """A fit of the same rows taken on to this engine's tolerance, from its values and outliers, under its noise."""
         self._scales = fit.priors.scales
+        self.positions = fit.predicted_positions()
         options = {"fixed": fixed, "noise": fit.noise, "first_weights": fit.weights, "like": fit.model, "near": True}
         return self.fit(effects_in(fit), start=values_of(fit), **options)
 
@@ -155,7 +159,8 @@ class Engine:
         scales = Likelihood.of(fit, columns).likeliest()
         if scales.keys() == fit.priors.scales.keys():
             return fit
-        return self.fit(effects_in(fit), start=values_of(fit), fixed=fixed, noise=fit.noise, near=True, scales=scales)
+        same = {"noise": fit.noise, "positions": fit.positions, "scales": scales}
+        return self.fit(effects_in(fit), start=values_of(fit), fixed=fixed, near=True, **same)
 
     def linear_fit(self, at: joint.Fit, **options: Any) -> joint.Fit:
         """joint.linear_fit() of the rows of this engine."""

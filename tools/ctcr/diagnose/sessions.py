@@ -104,8 +104,8 @@ def _wins(engine: Engine, one: Fit, framed: Engine) -> bool:
     if beyond < settings.DECISIVE or explained < settings.SESSION_EXPLAINED:
         return False
     wide = {name: settings.SESSION_PRIOR_WIDER * sd for name, sd in zip(frame, engine.priors(frame)[1], strict=True)}
-    options = {"rows": engine.rows, "sd": wide, "noise": one.noise, "tolerance": engine.tolerance, **one.frozen}
-    elsewhere = joint.fit(engine.robot, engine.measurements, one.names, **options)
+    same = {"noise": one.noise, "positions": one.positions, "tolerance": engine.tolerance, **one.frozen}
+    elsewhere = joint.fit(engine.robot, engine.measurements, one.names, rows=engine.rows, sd=wide, **same)
     if evidence < elsewhere.log_evidence + settings.DECISIVE:
         return False
     own = framed.fit_with_field([], values_of(own))

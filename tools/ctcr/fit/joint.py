@@ -61,6 +61,7 @@ def fit(
     rows: Mask | None = None,
     sd: Mapping[str, float] | None = None,
     noise: Noise | None = None,
+    positions: Array | None = None,
     starts: int = settings.STARTS,
     **options: Any,
 ) -> Fit:
@@ -69,6 +70,7 @@ def fit(
     rows     (M,) readings to fit, all by default; the others are judged with the result. Split by run, never by row.
     sd       {name: prior standard deviation in SI, or math.inf} over the file's `uncertainty`
     noise    of the tracker; `noise_of_readings` by default. What is uncertain of the sensor's pose is always free
+    positions  (M, 3) [m] of the sensor, tracker frame, of another fit; by default those that the fit predicts
     starts   that are compared, all but the first drawn from the priors
     options  weights, inflation, scales and tolerance, as in `FitOptions`
     Raises NoFit where none is possible.
@@ -78,7 +80,8 @@ def fit(
     names = told(sensor_pose.with_pose(free, robot), measurements)
     noise = noise or noise_of_readings(robot, measurements)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
-    rows, positions = measurements.measured & chosen, sensor_positions(robot, measurements)
+    rows = measurements.measured & chosen
+    at = sensor_positions(robot, measurements) if positions is None else positions
     priors = Priors.of(robot, names, measurements.beta[chosen], sd)
     steps = recording.steps_for(robot, measurements, noise)
     options["row"] = measurements.row
@@ -91,10 +94,15 @@ def fit(
         if like:
             table.begin_at(like.model)
             how |= like.frozen
-        return fit_joint(table, priors, noise, positions, rows, **how)
+        return fit_joint(table, priors, noise, at, rows, **how)
 
-    start, priors = _with_frame(model(), priors, noise, positions, rows, **options)
-    fitted = one_sided.widened(one_sided.restarted(fit_from(start, starts=starts), fit_from))
+    start, priors = _with_frame(model(), priors, noise, at, rows, **options)
+    fitted = fit_from(start, starts=starts)
+    if positions is None and (noise.position_field or noise.rotation_field):
+        at = fitted.predicted_positions()
+        near = options | {"start": fitted.values, "first_weights": fitted.weights, "few_first": False}
+        fitted = replace(fit_joint(fitted.model, priors, noise, at, rows, **near), starts=fitted.starts)
+    fitted = one_sided.widened(one_sided.restarted(fitted, fit_from))
     warnings = [*said, *_table_warnings(measurements, rows), *fitted.warnings]
     return replace(fitted, warnings=warnings, seconds=perf_counter() - began)
 
@@ -109,7 +117,8 @@ def fit_joint(
     few_first: bool = True,
     **options: Any,
 ) -> Fit:
-    """Fits a model to its readings, which the sensor took at `positions` (M, 3) [m], tracker frame.
+    """Fits a model to its readings, where the sensor's `positions` (M, 3) [m], tracker frame, say how its field errors
+    are related: best as predicted, see Fit.predicted_positions().
 
     rows       (M,) that are fitted, all by default
     few_first  whether, of many rows, fits to a few find the start and compare the starts
@@ -255,16 +264,19 @@ def linear_fit(
     at: Fit,
     *,
     noise: Noise | None = None,
+    positions: Array | None = None,
     rows: Mask | None = None,
     only: Mask | None = None,
     more: ArrayLike = 0.0,
     weights: Array | None = None,
     **options,
 ) -> Fit:
-    """Like fit_joint() with the parameters of a fit, but with the model linearised there: other noise, rows (M,) or
-    weights (M, 2) are cheap. `rows` are used only where no weights are given; a weight of 0 leaves a row out. `more`
-    (M, 6) is added to the residual. With `only` (M,) the fit holds these rows alone, and `weights` belongs to them."""
-    residual, jacobian, positions = at.residual + more, at.jacobian_all, at.positions
+    """Like fit_joint() with the parameters of a fit, but with the model linearised there: other noise, positions
+    (M, 3), rows (M,) or weights (M, 2) are cheap. `rows` are used only where no weights are given; a weight of 0 leaves
+    a row out. `more` (M, 6) is added to the residual. With `only` (M,) the fit holds these rows alone, and `weights`
+    belongs to them."""
+    residual, jacobian = at.residual + more, at.jacobian_all
+    positions = at.positions if positions is None else positions
     if weights is None and rows is not None:
         residual = np.where(rows[:, None], residual, nan)
     if only is not None:
@@ -293,12 +305,12 @@ def rejects(fit: Fit) -> bool:
     return p_value(fit) < settings.SIGNIFICANCE
 
 
-def likeliest_field(fit: Fit) -> Noise:
-    """The noise of a fit with that part of its field error which makes the readings likeliest, by linearised fits."""
-    parts = [
-        linear_fit(fit, noise=with_field(fit.noise, part), weights=fit.weights) for part in settings.FIELD_PARTS[1:]
-    ]
-    return max([fit, *parts], key=lambda tried: tried.log_evidence).noise
+def likeliest_field(fit: Fit, positions: Array | None = None) -> Noise:
+    """The noise of a fit with that part of its field error which makes the readings likeliest, by linearised fits; with
+    the sensor at other `positions` (M, 3) [m] where given."""
+    noises = (with_field(fit.noise, part) for part in settings.FIELD_PARTS)
+    fits = [linear_fit(fit, noise=noise, positions=positions, weights=fit.weights) for noise in noises]
+    return max(fits, key=lambda tried: tried.log_evidence).noise
 
 
 def tracker_error(fit: Fit, noise: Noise) -> tuple[float, float]:

@@ -100,7 +100,7 @@ class Fit:
 
     priors: Priors
     noise: Noise
-    positions: Array | None  # (M, 3) [m] of the sensor, tracker frame
+    positions: Array | None  # (M, 3) [m] of the sensor, tracker frame, on which the field error depends
     core: Any  # _core.Identification
     model: ResidualModel | None  # that was fitted
     excluded: list[int]  # rows that the model cannot solve
@@ -144,6 +144,16 @@ class Fit:
     def used(self) -> Mask:
         """Rows that were fitted (M,)."""
         return (self.weights > 0).any(axis=1)
+
+    def predicted_positions(self) -> Array:
+        """(M, 3) [m] of the sensor, tracker frame, at the fitted values; `positions` where the model has no solution.
+
+        At measured positions the jitter of a reading would pass for a change of the field.
+        """
+        self._activate_all()
+        self.model.residual(self.values)
+        predicted, _ = self.model.predicted()
+        return np.where(np.isfinite(predicted), predicted, self.positions)
 
     @property
     def frozen(self) -> dict[str, Array]:

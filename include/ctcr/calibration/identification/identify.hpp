@@ -286,7 +286,8 @@ private:
 /// Iteratively reweighted, damped Gauss-Newton on the whitened residuals and the prior, then the same from other starts.
 /// Linear in the rows; memory for two matrices of 6 rows x parameters and the field's factors. Deterministic for a
 /// deterministic predictor.
-/// @param positions  (rows, 3) of the sensor, tracker frame [m]: field errors of near positions are alike
+/// @param positions  (rows, 3) of the sensor, tracker frame [m], best as predicted near the result: field errors of near
+///     positions are alike, and at measured positions jitter would pass for a change of the field
 /// @throws std::invalid_argument where no fit is possible, with one sentence a line. Real time: no.
 /// Ref: roles of the prior and of the noise as in Tarantola, "Inverse Problem Theory", 2005, sect. 3.
 inline Identification identify(const Predictor& predict, const std::vector<FreeParameter>& parameters,
