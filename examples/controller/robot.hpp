@@ -1,5 +1,5 @@
 // The robot "table2": tubes, homes, frames, effects and limits, and the model of them.
-// Exported by ctcr 0.1.0 on 2026-11-27 from "table2.yaml": change that, not this header.
+// Exported by ctcr 0.1.0 on 2026-11-30 from "table2.yaml": change that, not this header.
 // sha256 of the file: 5d81dc0b9c06a0d1f05f198b27c4a91fbd536aa127f52d31d6e38b3df3063de5
 // SI units; tubes from the innermost outwards. `sd`: standard deviation of a value that was fitted.
 // clang-format off
@@ -10,6 +10,9 @@
 #include <ctcr/control/limits.hpp>
 #include <ctcr/ctcr.hpp>
 
+#ifdef robot
+#error "robot is a macro here: export the robot with another --namespace"
+#endif
 namespace robot {
 
 inline constexpr int tube_count = 3;

@@ -22,9 +22,8 @@ from ctcr.robot.ledger import section
 from ctcr.show.wording import deviation, number, visible
 
 RATIOS = ("translation_mm_per_rev", "rotation_rev_per_rev")
-# Of C++20: keywords, other spellings of operators, and what standard headers and GCC define in lower case. Macros in
-# capitals and the names of the C library need no list, see is_free().
-TAKEN = set(
+# Keywords and other spellings of operators of C++20.
+KEYWORDS = set(
     """
     alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t char32_t class
     co_await co_return co_yield compl concept const const_cast consteval constexpr constinit continue decltype default
@@ -33,7 +32,6 @@ TAKEN = set(
     reinterpret_cast requires return short signed sizeof static static_assert static_cast struct switch template this
     thread_local throw true try typedef typeid typename union unsigned using virtual void volatile wchar_t while xor
     xor_eq
-    alloca assert errno i386 linux main offsetof timespec timeval tm unix
     """.split()
 )
 SAME = 1e-6  # relative: a ledger and a file round the same value to eight digits
@@ -78,6 +76,7 @@ def cpp_header(robot: Robot, namespace: str = "robot", bench: Bench | None = Non
             "#include <ctcr/ctcr.hpp>",
             *(["#include <ctcr/effects/catalogue.hpp>", "#include <string_view>"] if robot.effects else []),
             "",
+            *_no_macros(namespace.split("::")),
             f"namespace {namespace} {{",
             "",
             f"inline constexpr int tube_count = {robot.n_tubes};",
@@ -106,21 +105,29 @@ def _check(robot: Robot, namespace: str) -> None:
     ]
     problems += catalogue.in_python(robot)
     if not is_free(namespace.split("::")):
-        text = "is no free name in C++, as those of macros and of the C library: use letters, digits and _"
+        text = "is no free name in C++, as keywords and those of the C library: use letters, digits and _"
         problems.append(Problem(text, field=f"namespace {visible(namespace)}"))
     if problems:
         raise InputError(problems)
 
 
 def is_free(names: list[str]) -> bool:
-    """Whether a header can declare these nested namespaces.
+    """Whether a header can declare these nested namespaces, as far as no compiler is needed to say it.
 
-    A name that begins with two capitals, or with one and a digit or _, is a macro by convention (M_PI, EOF). What the C
-    library defines, headers declare outside of all namespaces; POSIX keeps names that end in _t.
+    What the C library defines, headers declare outside of all namespaces.
     """
-    word = re.compile(r"(?![A-Z]([A-Z\d_]|$))[A-Za-z]\w*", re.ASCII)
-    free = all(word.fullmatch(name) and name not in TAKEN | {"std", "ctcr"} for name in names)
-    return free and names[0] != "Eigen" and not names[0].endswith("_t") and not hasattr(ctypes.CDLL(None), names[0])
+    free = all(
+        re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) and name not in KEYWORDS | {"std", "ctcr"} for name in names
+    )
+    return free and names[0] != "Eigen" and not hasattr(ctypes.CDLL(None), names[0])
+
+
+def _no_macros(names: list[str]) -> Iterator[str]:
+    """The compiler alone knows which names are macros where the header is included."""
+    for name in dict.fromkeys(names):
+        yield f"#ifdef {name}"
+        yield f'#error "{name} is a macro here: export the robot with another --namespace"'
+        yield "#endif"
 
 
 def _opening(robot: Robot) -> Iterator[str]:
