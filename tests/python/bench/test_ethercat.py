@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from ctcr.bench.shared.ethercat import ProcessImage, signed
+from ctcr.bench.shared.folder import BUS
 from ctcr.bench.simulators.object_dictionary import Entry, ObjectDictionary, ServiceDataServer
 from ctcr.bench.simulators.segment import Segment
 from ctcr.bench.simulators.slave_controller import SlaveController
@@ -238,6 +239,16 @@ def test_ended_simulator(tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 1
     assert done.stderr.splitlines() == ["Error: the simulator ethercat has ended: nothing answers in its place", "over"]
+
+
+def test_second_simulator(tmp_path):
+    """A second simulator on the same interface is refused, also one with a folder of its own."""
+    skip_without_bench()
+    second = ctcr("sim", "ethercat", "--interface", BUS, "--folder", tmp_path / "second")
+    command = ctcr("sim", "bench", ROBOT, "--folder", tmp_path / "bench", "--", *second)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1
+    assert f"{BUS}: another simulator answers there" in done.stderr
 
 
 @pytest.mark.slow

@@ -160,7 +160,8 @@ def _without_roll(data: dict[str, Any]) -> dict[str, Any]:
 def unknown_effect(name: str, known: Iterable[str]) -> str:
     """The end of a message on an effect that is not there: what was meant, or how one of the user's own is named."""
     meant = suggestion(name, known, "`ctcr effects` lists those there are.")
-    return f"{meant} If it is your own, give its file: --effects FILE.py (in Python: ctcr.user_effects.load)"
+    own = "If it is your own, give its file: --effects FILE.py (in Python: ctcr.user_effects.load)"
+    return f"{meant} {own}. docs/effects.md says which commands cannot run it"
 
 
 def _unknown_effects(data: dict[str, Any], compiled: bool) -> list[checks.Fault]:

@@ -23,7 +23,8 @@ class ControlSocket:
         except OSError:
             self.path.unlink(missing_ok=True)  # left behind by a simulator that was killed
         else:
-            raise InputError(Problem("a simulator of this name is running there already", str(self.path)))
+            text = "a simulator of this name is running there already: end it, or use another --folder"
+            raise InputError(Problem(text, str(self.path)))
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket.bind(str(self.path))
         self._socket.listen(8)

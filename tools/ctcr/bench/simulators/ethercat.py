@@ -54,7 +54,7 @@ class EthercatSimulator(Simulator):
             raise InputError(Problem(f"{motors} motors: 1 to {MOST_AXES} can be simulated"))
         self.terminals = [StepperTerminal(i, variant) for i in range(motors)]
         self.segment = Segment([SlaveController(device) for device in (coupler(), *self.terminals)])
-        self._socket = raw_socket(interface)
+        self._alone, self._socket = alone_on(interface), raw_socket(interface)
         most = dict.fromkeys(OF_MOTORS, motors) | {"lost_after": len(self.segment.slaves)}
         super().__init__(folder, ETHERCAT, FAULTS, SIMULATED_BUS, scenario, most)
         self._record = shared_motors(folder, writer=True)
@@ -65,6 +65,7 @@ class EthercatSimulator(Simulator):
     def close(self) -> None:
         super().close()
         self._socket.close()
+        self._alone.close()
 
     def waits_for(self) -> tuple[list, float]:
         return [self._socket], min([IDLE_S, *(due - time.monotonic() for due, _ in self._late)])
@@ -133,6 +134,18 @@ class EthercatSimulator(Simulator):
                 motor.jump(JUMP_COUNTS)
             if changes.get("internal_error") == number:
                 terminal.fail()
+
+
+def alone_on(interface: str) -> socket.socket:
+    """Held by the simulator that answers on an interface, whatever its folder: two would answer each frame twice."""
+    held = socket.socket(socket.AF_UNIX)
+    try:
+        held.bind(f"\0ctcr sim ethercat {interface}")  # no file, but a name in the network that holds the interface
+    except OSError:
+        held.close()
+        text = "another simulator answers there: end it, use another --interface, or `ctcr sim bench`"
+        raise InputError(Problem(text, interface)) from None
+    return held
 
 
 def raw_socket(interface: str) -> socket.socket:
