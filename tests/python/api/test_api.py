@@ -325,6 +325,8 @@ def test_shown(robot, table, report, fit, found, better):
         text = result._repr_html_()
         assert "<table" in text and "color:#" not in text and "background" not in text
     assert "mm" in report._repr_html_() and "rad" in better._repr_html_()
+    shape = ctcr.Model(robot).shape(table.beta[0], table.alpha[0])
+    assert re.fullmatch(r"<Shape: 3 tubes, [\d.]+ mm long at \d+ arc lengths, stability [\d.]+>", repr(shape))
     for result in (report, fit, found, better):
         assert isinstance(result.plot(), matplotlib.figure.Figure) and result.plot()._repr_svg_().startswith("<svg")
 

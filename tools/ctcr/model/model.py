@@ -73,8 +73,8 @@ class Prediction(Shown):
         return Glance(line, ["", "x, mm", "y, mm", "z, mm", "status"], rows, notes)
 
 
-@dataclass(frozen=True)
-class Shape:
+@dataclass(frozen=True, repr=False)
+class Shape(Shown):
     """The robot from the front plate to its tip at K arc lengths: uniform ones and every breakpoint.
 
     Frames do not twist along the robot: at the plate they are the base frame, and tube i stands at `tube_angle[i]`
@@ -100,6 +100,10 @@ class Shape:
         half = self.tube_angle[tube] / 2
         about_z = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
         return product(self.quaternion, about_z)
+
+    def glance(self) -> Glance:
+        long = f"{1e3 * self.arc_length[-1]:.1f} mm long at {len(self.arc_length)} arc lengths"
+        return Glance(f"Shape: {len(self.tube_angle)} tubes, {long}, stability {self.stability:.2f}")
 
 
 def status_text(code: int) -> str:
