@@ -197,6 +197,37 @@ def test_numpy(truth, tmp_path, imported, refused, same):
     same(imported(path, "--columns", "t,beta1..beta2,alpha1..alpha2,x,y,z")[0], orientation=False)
 
 
+@pytest.mark.parametrize("form", ["lines", "list", "indented", "below a name", "arrays"])
+def test_json(truth, log, imported, same, form):
+    """JSON with an object a reading, or with arrays of all; null is not measured; a counter of frames is a clock."""
+    frames = np.round(truth.t / 1e-6).astype(int).tolist()
+    readings = [
+        {"frame": frame, "joints": {"beta": beta, "alpha": alpha}, "pose": {"position": position}}
+        for frame, beta, alpha, position in zip(
+            frames, truth.beta.tolist(), truth.alpha.tolist(), truth.position.tolist(), strict=True
+        )
+    ]
+    readings[0]["pose"] = None
+    readings[4]["pose"]["position"] = None
+    readings[5]["pose"]["position"] = [None] * 3
+    del readings[7]["pose"]
+    poses = [(each.get("pose") or {}).get("position") or [None] * 3 for each in readings]
+    arrays = {"frame": frames, "beta": truth.beta.tolist(), "alpha": truth.alpha.tolist(), "position": poses}
+    content = {
+        "lines": "\n".join(map(json.dumps, readings)),
+        "list": json.dumps(readings),
+        "indented": json.dumps(readings, indent=1),
+        "below a name": json.dumps({"name": "second", "readings": readings}),
+        "arrays": json.dumps(arrays),
+    }
+    table, said = imported(log(content[form]), "--column", "t=frame", "--unit", "t=1us")
+    unseen = [0, 4, 5, 7]
+    assert np.isnan(table.positions[unseen]).all()
+    table.positions[unseen] = truth.position[unseen]
+    same(table, orientation=False)
+    assert "(1, 5 to 6, 8)" in said
+
+
 @pytest.mark.parametrize("written", [1, 2])
 def test_labview_measurement(truth, log, imported, same, written):
     """A .lvm file: headers with numbers, units and decimal commas, one of them each time it was written to."""

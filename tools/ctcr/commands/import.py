@@ -73,9 +73,9 @@ _list_option = partial(options.repeated, callback=_names)
 def command(log, target, robot, joint_log, mapping, save_mapping, listed, out, **said) -> None:
     """Turn a log into a table of measurements.
 
-    LOG is text (any delimiter, decimal commas, header lines, units in names), a MATLAB .mat, an HDF5 or numpy file, an
-    export of NDI ToolBox or OptiTrack Motive, an MCAP file of ctcr export, or a table of measurements itself. What each
-    column was taken for is shown, and every row without a pose or left out is named.
+    LOG is text (any delimiter, decimal commas, header lines, units in names), a MATLAB .mat, an HDF5, numpy or JSON
+    file, an export of NDI ToolBox or OptiTrack Motive, an MCAP file of ctcr export, or a table of measurements itself.
+    What each column was taken for is shown, and every row without a pose or left out is named.
 
     Example: ctcr import log.csv -o measurements.csv --robot robot.yaml --translation from-flush --unit alpha=deg
     """

@@ -1,6 +1,7 @@
-"""Logs in files of named arrays: MATLAB's .mat, HDF5, and .npz and .npy of numpy."""
+"""Logs in files of named arrays: MATLAB's .mat, HDF5, .npz and .npy of numpy, and JSON."""
 
 import io
+import json
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -54,6 +55,40 @@ def read_numpy(path: Path, content: bytes) -> Log:
     if isinstance(loaded, np.ndarray) and loaded.ndim == 2:
         arrays = {f"#{i}": column for i, column in enumerate(loaded.T, start=1)}
     return _log(path, "numpy", {name: hdf5.by_field(array) for name, array in arrays.items()}, [], "")
+
+
+def read_json(path: Path, content: bytes) -> Log:
+    """JSON: an object a reading, in a list or in lines of their own, or arrays that hold a value a reading."""
+    lines = [(i, line) for i, line in enumerate(content.splitlines(), start=1) if line.strip()]
+    is_lines = len(lines) > 1 and all(line.rstrip().endswith(b"}") for _, line in lines[:2])
+    read: list[Any] = []
+    for number, part in lines if is_lines else [(None, content)]:
+        try:
+            read.append(json.loads(part))
+        except (ValueError, RecursionError) as error:
+            raise InputError(Problem(f"is damaged JSON: {error}", str(path), number)) from None
+    try:
+        variables = dict(_flat("log", read if is_lines else read[0]))
+    except ValueError:
+        raise InputError(Problem("is JSON with lists in which lists of several lengths stand", str(path))) from None
+    return _log(path, "JSON", variables, [], "; write an object a reading, or arrays that hold a value a reading")
+
+
+def _flat(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """The values and arrays of an object, with the names of the objects that hold them; NaN for null."""
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            yield from _flat(f"{prefix}.{name}" if prefix else name, inner)
+    elif isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
+        yield prefix, np.array([dict(_flat("", item)) for item in value], dtype=object)
+    else:
+        yield prefix, np.array(_known(value)) if isinstance(value, list) else _known(value)
+
+
+def _known(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_known(item) for item in value]
+    return np.nan if value is None else value
 
 
 @dataclass(frozen=True)
@@ -152,10 +187,16 @@ def _arrays(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
             if _holds_columns(value[0]):  # a run each
                 yield from _arrays(prefix, {str(number): item for number, item in enumerate(value, start=1)})
                 return
-            for name in value[0]:  # a row each
+            for name in dict.fromkeys(key for item in value for key in item):  # a row each
                 parts = [np.atleast_1d(item.get(name, np.nan)) for item in value]
+                size = max(part.shape for part in parts)
+                parts = [np.full(size, np.nan) if _is_missing(part) else part for part in parts]
                 if len({part.shape for part in parts}) == 1 and parts[0].dtype.kind in "fiubU":
                     yield from _arrays(f"{prefix}.{name}", np.squeeze(np.stack(parts)))
+
+
+def _is_missing(part: Array) -> bool:
+    return part.dtype.kind == "f" and part.shape == (1,) and bool(np.isnan(part[0]))
 
 
 def _holds_columns(structure: dict[str, Any]) -> bool:

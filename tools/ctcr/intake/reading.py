@@ -14,13 +14,13 @@ _READERS: dict[bytes | tuple[bytes, ...], Callable[[Path, bytes], Log]] = {
     (hdf5.MATLAB, hdf5.SIGNATURE): containers.read_hdf5,
     messages.MCAP: messages.read_mcap,
     (containers.NPY, b"PK"): containers.read_numpy,
+    (b"{", b"[{", b"[\n", b"[\r"): containers.read_json,
 }
 _SHEET = "is a spreadsheet: save the sheet of the log as CSV"
 _FRAME = 'read it in Python, and save it with frame.to_csv("log.csv", index=False) of pandas, or numpy.savez'
 _REFUSED: dict[bytes | tuple[bytes, ...], str] = messages.BAGS | {
     b"\xd0\xcf\x11\xe0": _SHEET,
     (b"\x80\2", b"\x80\3", b"\x80\4", b"\x80\5"): f"is a pickle of Python, which may run code: {_FRAME}",
-    (b"[{", b'{"'): f"is JSON: {_FRAME}",
 }
 
 
