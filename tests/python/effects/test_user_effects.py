@@ -356,6 +356,10 @@ def test_all_faults(file):
     [
         ("return rows.beta, rows.alpha + 1e-6 + values.gain", "changes alpha by 1e-06 at its neutral values"),
         ("return rows.beta", "must return two arrays"),
+        (
+            "rows.beta[:] = 0; return rows.beta, rows.alpha",
+            "line 8: Mine.joints fails: assignment destination is read-only",
+        ),
         ("return rows.beta, rows.alpha[:2]", "it must be ("),
         ("return rows.beta, rows.alpha / (values.gain - values.gain)", "not finite, first in row 2"),
         ("return rows.beta, rows.nothing", "mine.py, line 8: Mine.joints fails"),

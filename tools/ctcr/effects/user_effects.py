@@ -93,7 +93,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Rows:
-    """Rows of the table that a hook gets, in the order measured."""
+    """Rows of the table that a hook gets, in the order measured. They cannot be written to."""
 
     t: Array  # (M,) [s], NaN where unknown
     run: Integers  # (M,)
@@ -103,7 +103,10 @@ class Rows:
 
     @classmethod
     def of(cls, measurements: Measurements) -> "Rows":
-        return cls(*(getattr(measurements, name) for name in cls.__dataclass_fields__))
+        views = [getattr(measurements, name).view() for name in cls.__dataclass_fields__]
+        for view in views:
+            view.flags.writeable = False
+        return cls(*views)
 
 
 class Effect:
