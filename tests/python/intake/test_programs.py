@@ -153,6 +153,20 @@ def test_one_log_without_times(truth, log, joints, imported, refused, tmp_path):
     np.testing.assert_allclose(table.positions, truth.position, atol=1e-9)
 
 
+def test_two_counters(truth, log, imported, same, tmp_path):
+    """Of two logs that count frames of different periods, that of the joints gets its times first; no row is lost."""
+    count = np.arange(len(truth.t))
+    imported(
+        log(text(["cycle", *JOINTS[1:]], [50 * count, truth.run, truth.beta, truth.alpha])),
+        *"--column t=cycle --unit t=0.7ms".split(),
+    )
+    timed = (tmp_path / "measurements.csv").rename(tmp_path / "timed.csv")
+    poses = log(text(["frame", "x", "y", "z"], [count + 9, truth.position]))
+    table, _ = imported(poses, "--joints", timed, *"--column t=frame --unit t=35ms --offset t=-0.315s".split())
+    same(table, time=False, orientation=False, run=True)
+    np.testing.assert_allclose(np.diff(table.t), 0.035, atol=1e-9)
+
+
 def test_mat(truth, tmp_path, imported, same, refused):
     """A structure of matrices, of other variables too; 4 x 4 matrices along the third axis."""
     path = tmp_path / "log.mat"

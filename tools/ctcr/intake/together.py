@@ -13,6 +13,8 @@ from ctcr.intake.mapping import MOVING
 from ctcr.intake.motion import Motion, complete, row_ranges
 from ctcr.show.wording import listed
 
+SAME_S = 1e-9  # times of two clocks that differ by less are one
+
 
 def divided(choices: Choices, poses: Log, joints: Log) -> tuple[Choices, Choices]:
     """The choices that concern the log of the poses, and those that concern the log of the joints: names of times or of
@@ -53,7 +55,8 @@ def at(columns: Columns, moving: Columns, moved: Motion, t: Array, zero: float, 
     if not all(timed):
         lacking, other = (moving, columns) if timed[0] else (columns, moving)
         text = f"has no times, {other.log.path.name} has: name its column with --column t=NAME; a number of the frame"
-        text += ", at 60 a second, takes --unit t=16.667ms too"
+        text += ", at 60 a second, takes --unit t=16.667ms too; where both logs count frames, import that of the joints"
+        text += " alone first, and give --joints what it wrote"
         if len(rows) == len(moved.rows):
             text += f"; where the logs belong together row by row, --ignore {other.mapping.used['t'].name}"
         unused = listed(lacking.unused, 30)
@@ -70,7 +73,7 @@ def at(columns: Columns, moving: Columns, moved: Motion, t: Array, zero: float, 
         text += " times of day, and dates, count from the first row of their log, such as --offset t=12.5s"
         raise InputError(Problem(text, file, field=moving.name("t")))
     clock = t + (shift or 0.0) + (zero - moved.zero if alike else 0.0)  # of the poses, by the clock of the joints
-    inside = (clock >= known.t[0]) & (clock <= known.t[-1])
+    inside = (clock >= known.t[0] - SAME_S) & (clock <= known.t[-1] + SAME_S)
     if not inside.any():
         span = f"{known.t[0]:g} to {known.t[-1]:g} s, those of the poses {np.nanmin(clock):g} to {np.nanmax(clock):g} s"
         text = f"its times are {span}: say what to add to those of the poses, such as --offset t=12.5s"
