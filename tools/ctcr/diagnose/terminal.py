@@ -93,15 +93,8 @@ def show_fitted(console: Any, n_tubes: int, fitted: Iterable[tuple[str, float, f
             hidden += len(alike) - len(clearest)
             for k, (name, value, sd) in enumerate(row for row in alike if row in clearest):
                 short = name.removeprefix(f"effects.{identity}.")
-                rows.append(
-                    [
-                        short,
-                        number(value, sd),
-                        deviation(sd),
-                        known[name].unit,
-                        "the same" if k and meaning else meaning,
-                    ]
-                )
+                said = "the same" if k and meaning else meaning
+                rows.append([short, number(value, sd), deviation(sd), known[name].unit, said])
         columns = ["parameter", "value", "sd", "unit", "meaning"]
         console.print(output.table(f"Fitted: {identity} (SI)", columns, rows, text=(0, 3, 4)))
         if hidden:

@@ -116,9 +116,8 @@ def is_free(names: list[str]) -> bool:
 
     What the C library defines, headers declare outside of all namespaces.
     """
-    free = all(
-        re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) and name not in KEYWORDS | {"std", "ctcr"} for name in names
-    )
+    word = re.compile(r"[A-Za-z]\w*", re.ASCII)
+    free = all(word.fullmatch(name) and name not in KEYWORDS | {"std", "ctcr"} for name in names)
     return free and names[0] != "Eigen" and not hasattr(ctypes.CDLL(None), names[0])
 
 
