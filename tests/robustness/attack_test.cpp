@@ -48,7 +48,7 @@ auto without_effects(const Robot<N>& robot, test::Random&) {
 
 TYPED_TEST(RandomRobots, SuchAsPeopleBuild) {
   constexpr int N = TypeParam::N;
-  const test::Tally tally = attack<N>("sane", 1500, test::sane_case<N>, without_effects<N>);
+  const test::Tally tally = attack<N>("sane", 800, test::sane_case<N>, without_effects<N>);
   EXPECT_GT(tally.judged, 0);
   std::cout << test::evaluations_table(tally, "N = " + std::to_string(N));
   for (const auto& [start, evaluations] : tally.evaluations) EXPECT_LE(std::ranges::max(evaluations), 300) << start;
@@ -56,12 +56,12 @@ TYPED_TEST(RandomRobots, SuchAsPeopleBuild) {
 
 TYPED_TEST(RandomRobots, Harder) {
   constexpr int N = TypeParam::N;
-  attack<N>("wide", 500, test::wide_case<N>, without_effects<N>);
+  attack<N>("wide", 300, test::wide_case<N>, without_effects<N>);
 }
 
 TYPED_TEST(RandomRobots, ThatCannotExist) {
   constexpr int N = TypeParam::N;
-  const test::Tally tally = attack<N>("garbage", 2000, test::garbage_case<N>, without_effects<N>);
+  const test::Tally tally = attack<N>("garbage", 1000, test::garbage_case<N>, without_effects<N>);
   EXPECT_GT(tally.statuses.size(), 5u);
 }
 
@@ -75,7 +75,7 @@ TYPED_TEST(RandomRobotsWithEffects, OfAnySize) {
   const auto with_effects = [](const Robot<N>& robot, test::Random& random) {
     return std::pair(Model<N, Catalogue>(robot, test::random_effects<N>(random, 3)), std::optional<test::Known<N>>{});
   };
-  const test::Tally tally = attack<N>("effects", 400, test::sane_case<N>, with_effects);
+  const test::Tally tally = attack<N>("effects", 200, test::sane_case<N>, with_effects);
   EXPECT_GT(tally.evaluations.at("cold").size(), 0u);
   std::cout << test::evaluations_table(tally, "effects, N = " + std::to_string(N));
 }
@@ -113,7 +113,7 @@ TYPED_TEST(RandomRobotsWithEffects, OfTheMaterial) {
                       Vec3(weight.template get<1>(), weight.template get<2>(), weight.template get<3>());
     return std::pair(Model<N, Catalogue>(robot, effects), known);
   };
-  EXPECT_GT(attack<N>("effects of the material", 200, test::sane_case<N>, of_the_material).judged, 0);
+  EXPECT_GT(attack<N>("effects of the material", 120, test::sane_case<N>, of_the_material).judged, 0);
 }
 
 /// The equations with effects, none of which changes anything: the independent model judges them.
@@ -122,7 +122,7 @@ TYPED_TEST(RandomRobotsWithEffects, TooSmallToMatter) {
   const auto hardly_any = [](const Robot<N>& robot, test::Random&) {
     return std::pair(Model<N, Catalogue>(robot, test::hardly_any_effects<N>()), test::Known<N>{});
   };
-  EXPECT_GT(attack<N>("hardly any effects", 400, test::sane_case<N>, hardly_any).judged, 0);
+  EXPECT_GT(attack<N>("hardly any effects", 200, test::sane_case<N>, hardly_any).judged, 0);
 }
 
 }  // namespace attack_test
