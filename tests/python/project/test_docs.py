@@ -76,6 +76,10 @@ def project(tmp_path: Path) -> Path:
     return tmp_path
 
 
+# A reader optimises; the same program compiles in a third of the time without.
+OPTIMISED, FAST = " -O3 ", " -O0 -DCTCR_FAST_COMPILE "
+
+
 def run(command: list, folder: Path) -> str:
     done = subprocess.run(
         command,
@@ -141,7 +145,7 @@ def test_commands(document, project):
                     for word in (subcommand, *(word for word in rest if word.startswith("-"))):
                         assert re.search(rf"(?<![\w-]){word}(?![\w-])", usage), f"{command}: not in tools/dev"
                 else:
-                    printed += run(["bash", "-c", command], project)
+                    printed += run(["bash", "-c", command.replace(OPTIMISED, FAST)], project)
 
 
 @pytest.mark.parametrize("block", all_blocks("python"))
