@@ -23,6 +23,7 @@ DOCUMENTS = [
         path for folder in ("docs", "include", "examples", "bench", "tools") for path in (ROOT / folder).rglob("*.md")
     ),
 ]
+LARGEST_PAGE = 1_000_000  # bytes
 RUN = ("tools/dev", ".venv/bin/ctcr", "c++", "build/")  # what commands begin with
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -131,7 +132,7 @@ def test_names_exist():
 
 @pytest.mark.parametrize("document", [path for path in DOCUMENTS if blocks(path, "sh")], ids=name)
 def test_commands(document, project):
-    """They run, and print what the document shows behind them."""
+    """They run, and print what the document shows behind them; reports are small pages."""
     usage = run([ROOT / "tools/dev", "--help"], project)
     printed = ""
     for language, body in all_blocks_of(document):
@@ -146,6 +147,8 @@ def test_commands(document, project):
                         assert re.search(rf"(?<![\w-]){word}(?![\w-])", usage), f"{command}: not in tools/dev"
                 else:
                     printed += run(["bash", "-c", command.replace(OPTIMISED, FAST)], project)
+    for page in (project / "build").glob("*.html"):
+        assert page.stat().st_size <= LARGEST_PAGE, page.name
 
 
 @pytest.mark.parametrize("block", all_blocks("python"))
