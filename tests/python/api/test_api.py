@@ -237,8 +237,8 @@ def test_wrong_convention(robot, table):
 
 @pytest.fixture(scope="module")
 def shuffled(table):
-    """The same rows in another order than their times."""
-    order = np.random.default_rng(1).permutation(len(table))
+    """Half of the rows in another order than their times."""
+    order = np.random.default_rng(1).permutation(len(table))[::2]
     return ctcr.read(pytest.importorskip("pandas") and table.to_frame().iloc[order])
 
 
