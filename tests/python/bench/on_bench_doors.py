@@ -11,14 +11,17 @@ from ctcr.bench.devices.tracker import Tracker
 from ctcr.robot import robot_file
 from simulated_bench import mended_bench
 
+DATAGRAM, LISTENING = "0002", "00010000"  # type and flags in /proc/net/unix
+
 
 def doors(folder) -> list[str]:
-    """Sockets of this bench's network that are not in the folder: of any process, on any address."""
+    """Sockets of this bench's network, of any process, that let somebody in and are not in the folder."""
     found = []
     for kind in ("tcp", "tcp6", "udp", "udp6"):
         found += Path(f"/proc/net/{kind}").read_text().splitlines()[1:]
-    lines = Path("/proc/net/unix").read_text().splitlines()[1:]
-    names = [line.split()[7] for line in lines if len(line.split()) > 7]
+    named = [line.split() for line in Path("/proc/net/unix").read_text().splitlines()[1:] if len(line.split()) > 7]
+    # A stream that does not listen only holds its name.
+    names = [name for *_, flags, kind, _, _, name in named if kind == DATAGRAM or flags == LISTENING]
     return found + [name for name in names if Path(name).parent.resolve() != folder.resolve()]
 
 
