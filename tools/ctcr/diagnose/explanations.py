@@ -12,7 +12,7 @@ effects. Four likelihoods weigh them:
   2 s), any for one beside others, likely small for an imitation (2 (1 - s)), and exponential for one that only mends
   the forms of the others. Their form error is its scale: the less exact they are, the more of what they leave may
   follow the form of another effect;
-- the test of the residual against the noise as stated.
+- the test of the residual of all readings, held-out ones too, against the noise as stated.
 """
 
 import math

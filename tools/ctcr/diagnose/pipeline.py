@@ -192,9 +192,9 @@ def diagnose(
 ) -> Diagnosis:
     """Which effects are missing. Raises InputError where no fit is possible.
 
-    What is found in three quarters of the runs is judged on the held-out quarter. Where nothing was found and that
-    quarter has errors which the others do not have, another one is held out and everything begins anew; so it does
-    without those held-out runs that the others turn out not to determine.
+    What is found in three quarters of the runs is judged on the held-out quarter. Where nothing was found and noise
+    does not explain all runs, another quarter is held out and everything begins anew; so it does without those held-out
+    runs that the others turn out not to determine.
     """
     began = perf_counter()
     check_size(measurements)
@@ -210,7 +210,7 @@ def diagnose(
             again = _diagnose_robustly(robot, measurements, held_out, **options)
             if again.accepted or not result.accepted:  # else the runs that showed the effect are now held out
                 result = again
-        if result.accepted or not _has_new_errors(result):
+        if result.accepted or not result.residual.structured:
             break
     result = result.without_effects or result
     if not result.measurements.from_home:
@@ -255,12 +255,6 @@ def _undetermined_groups(result: Diagnosis) -> set[int]:
             when = dict(a.best.candidate.shape)[moment]
             found |= set(group[rows_around(result.measurements, ~result.held_out, when)])
     return found
-
-
-def _has_new_errors(result: Diagnosis) -> bool:
-    """Whether the held-out runs have errors that the fitted ones do not have."""
-    seen = np.isfinite(result.calibrated.residual[:, 0])
-    return bool(np.mean(outliers.outliers(result.calibrated)[seen & result.held_out]) > settings.MOST_OUTLIERS)
 
 
 def _diagnose(

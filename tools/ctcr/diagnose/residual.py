@@ -16,7 +16,7 @@ from ctcr.show.wording import listed, percent, runs_named
 
 @dataclass(frozen=True)
 class Residual:
-    p_value: float  # of the noise as stated
+    p_value: float  # of the noise as stated, of all readings
     clusters: list[int]  # rows of the table that are outliers in the same direction as their neighbours
     runs: list[int]  # of which most readings are outliers, those that no fit saw too
     outliers: float  # fraction of all readings
@@ -74,11 +74,13 @@ def residual_of(engine: Engine, before: joint.Fit, fit: joint.Fit, corrections: 
     ranked = _rank(engine, sample, before)
     after = ranked if fit is before else _rank(engine, sample, fit)
     clusters = engine.measurements.row[clustered(engine.measurements, fit)].tolist()
-    runs, far = [], 0.0
+    runs, far, every = [], 0.0, fit
     if not corrections:  # else a held-out run has nuisance errors of its own, which no fit knows
         runs = unexplained_runs(engine.measurements, fit)
         far = float(np.mean(beyond_noise(fit)[np.isfinite(fit.residual[:, 0])]))
-    return Residual(joint.p_value(fit), clusters, runs, far, ranked, after, sample, corrections)
+        noise = joint.likeliest_field(joint.linear_fit(fit, noise=engine.noise))
+        every = joint.linear_fit(fit, noise=noise)  # held-out readings too
+    return Residual(joint.p_value(every), clusters, runs, far, ranked, after, sample, corrections)
 
 
 def _rank(engine: Engine, sample: Sample, fit: joint.Fit) -> Ranking:
