@@ -21,8 +21,8 @@ DWELL, APPROACH, RETURN = 2.0, 9.0, 6.0  # [s] from stop to stop, to the next ru
 SETTLED = 1.5  # [s] of rest before a reading at a stop
 STREAM_PERIOD, STREAM_TIMES = 0.125, (24.875, 8.25)  # [s] between readings; of a slow and of a fast run
 ROTATION_ONLY = 0.4  # share of runs in which no tube translates
-ELEMENT_LENGTH = 6e-3  # [m]: tip error below 0.1 micrometres; the jitter is 35, and hundreds of readings average it
-HISTORY_ELEMENT_LENGTH = 4e-3  # [m]: 0.2 micrometres, at worst 10, for robots that go in small moves
+ELEMENT_LENGTH = 6e-3  # [m]: tip error 0.001 micrometres, 1 with kinks and contact; hundreds of readings average jitter
+HISTORY_ELEMENT_LENGTH = 4e-3  # [m]: 1 to 6 micrometres, for robots that go in small moves on one grid
 OUTLIER_SHARE, OUTLIER_SIZE = 0.005, (1e-3, 3e-3)  # [m]
 SMALLEST_SWEEP = np.deg2rad(40.0)
 

@@ -23,7 +23,6 @@ DOCUMENTS = [
         path for folder in ("docs", "include", "examples", "bench", "tools") for path in (ROOT / folder).rglob("*.md")
     ),
 ]
-LARGEST_PAGE = 1_000_000  # bytes
 RUN = ("tools/dev", ".venv/bin/ctcr", "c++", "build/")  # what commands begin with
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -77,10 +76,6 @@ def project(tmp_path: Path) -> Path:
     return tmp_path
 
 
-# A reader optimises; the same program compiles in a third of the time without.
-OPTIMISED, FAST = " -O3 ", " -O0 -DCTCR_FAST_COMPILE "
-
-
 def run(command: list, folder: Path) -> str:
     done = subprocess.run(
         command,
@@ -132,7 +127,7 @@ def test_names_exist():
 
 @pytest.mark.parametrize("document", [path for path in DOCUMENTS if blocks(path, "sh")], ids=name)
 def test_commands(document, project):
-    """They run, and print what the document shows behind them; reports are small pages."""
+    """They run, and print what the document shows behind them."""
     usage = run([ROOT / "tools/dev", "--help"], project)
     printed = ""
     for language, body in all_blocks_of(document):
@@ -146,9 +141,7 @@ def test_commands(document, project):
                     for word in (subcommand, *(word for word in rest if word.startswith("-"))):
                         assert re.search(rf"(?<![\w-]){word}(?![\w-])", usage), f"{command}: not in tools/dev"
                 else:
-                    printed += run(["bash", "-c", command.replace(OPTIMISED, FAST)], project)
-    for page in (project / "build").glob("*.html"):
-        assert page.stat().st_size <= LARGEST_PAGE, page.name
+                    printed += run(["bash", "-c", command], project)
 
 
 @pytest.mark.parametrize("block", all_blocks("python"))

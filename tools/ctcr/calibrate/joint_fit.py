@@ -22,7 +22,7 @@ from ctcr.fit.result import Fit, rms
 from ctcr.fit.sessions import placed, some_rows
 from ctcr.model import fields
 from ctcr.model.fields import Fitted
-from ctcr.model.noise import Noise, noise_of_readings
+from ctcr.model.noise import Noise, has_field, noise_of_readings
 from ctcr.model.sessions import told
 from ctcr.robot import ledger
 from ctcr.robot.description import Robot
@@ -270,7 +270,7 @@ def _held_out_parts(readings: Measurements, lever: float, count: int | None) -> 
 def _noises(robot: Robot, readings: Measurements, noise: str) -> list[Noise]:
     """The noises to try, the smaller first."""
     jitter, field = (noise_of_readings(robot, readings, field=wanted) for wanted in (False, True))
-    smooth = field.position_field > 0 or field.rotation_field > 0
+    smooth = has_field(field)
     return {"jitter": [jitter], "field": [field], "auto": [jitter, field] if smooth else [jitter]}[noise]
 
 

@@ -15,6 +15,7 @@ from ctcr.fit import folds, joint, one_sided
 from ctcr.fit.result import Priors
 from ctcr.fit.widening import Likelihood, Scales
 from ctcr.model import parameters, recording, user_recording
+from ctcr.model.noise import has_field
 from ctcr.model.protocol import ResidualModel
 from ctcr.model.sessions import told
 from ctcr.robot.description import Robot
@@ -109,8 +110,7 @@ class Engine:
     ) -> joint.Fit:
         """Like fit(), with the noise, positions, weights and inflation of another fit, so that their log evidences can
         be compared. It starts at the values of that fit, or at `start`, which lies near them."""
-        same = {"noise": other.noise, "positions": other.positions, "near": True, "like": other.model}
-        options = same | other.frozen | options
+        options = {"noise": other.noise, "near": True, "like": other.model} | other.frozen | options
         return self.fit(added, start=values_of(other) if start is None else start, **options)
 
     def fit_with_field(
@@ -127,8 +127,10 @@ class Engine:
 
         full = self.fit(added, start=start, fixed=fixed)
         full = one_sided.restarted(full, again)
+        if not has_field(full.noise):
+            return full
         self.positions = full.predicted_positions()
-        noise = joint.likeliest_field(full, self.positions)
+        noise = joint.with_likeliest_field(full, positions=self.positions).noise
         # Fitted anew, not linearised: far from the full model's values effects are not linear.
         return self.fit(added, start=values_of(full), fixed=fixed, noise=noise, first_weights=full.weights, near=True)
 

@@ -17,7 +17,7 @@ from ctcr.diagnose.engine import Engine
 from ctcr.diagnose.linearised import Gain, Linear, laplace
 from ctcr.effects import catalogue
 from ctcr.fit import folds
-from ctcr.fit.joint import Fit, as_stated, likeliest_field
+from ctcr.fit.joint import Fit, as_stated, with_likeliest_field
 from ctcr.table.measurements import Measurements
 
 CORRECTED = (
@@ -89,7 +89,7 @@ def corrected(engine: Engine, fit: Fit) -> tuple[Fit, list[str]]:
     if lags is None or lags.gain.log_evidence < settings.DECISIVE:
         return fit, []
     more = lags.lag[:, None] * np.nan_to_num(fit.jacobian_all[:, lags.delay].reshape(-1, 6))
-    noise = likeliest_field(engine.linear_fit(fit, more=more, noise=engine.noise))
+    noise = with_likeliest_field(engine.linear_fit(fit, more=more, noise=engine.noise)).noise
     there = engine.linear_fit(fit, more=more, noise=noise)
     if _unexplained(there) > settings.LAGS_LEAVE * _unexplained(fit):
         return fit, []

@@ -78,8 +78,8 @@ def residual_of(engine: Engine, before: joint.Fit, fit: joint.Fit, corrections: 
     if not corrections:  # else a held-out run has nuisance errors of its own, which no fit knows
         runs = unexplained_runs(engine.measurements, fit)
         far = float(np.mean(beyond_noise(fit)[np.isfinite(fit.residual[:, 0])]))
-        noise = joint.likeliest_field(joint.linear_fit(fit, noise=engine.noise))
-        every = joint.linear_fit(fit, noise=noise)  # held-out readings too
+        likeliest = joint.with_likeliest_field(joint.linear_fit(fit, noise=engine.noise))
+        every = joint.linear_fit(fit, noise=likeliest.noise)  # held-out readings too
     return Residual(joint.p_value(every), clusters, runs, far, ranked, after, sample, corrections)
 
 

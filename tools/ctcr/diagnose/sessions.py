@@ -104,7 +104,7 @@ def _wins(engine: Engine, one: Fit, framed: Engine) -> bool:
     if beyond < settings.DECISIVE or explained < settings.SESSION_EXPLAINED:
         return False
     wide = {name: settings.SESSION_PRIOR_WIDER * sd for name, sd in zip(frame, engine.priors(frame)[1], strict=True)}
-    same = {"noise": one.noise, "positions": one.positions, "tolerance": engine.tolerance, **one.frozen}
+    same = {"noise": one.noise, "tolerance": engine.tolerance, **one.frozen}
     elsewhere = joint.fit(engine.robot, engine.measurements, one.names, rows=engine.rows, sd=wide, **same)
     if evidence < elsewhere.log_evidence + settings.DECISIVE:
         return False

@@ -6,7 +6,6 @@ from math import nan, sqrt
 
 import numpy as np
 
-from ctcr import settings
 from ctcr.arrays import Array, Mask
 from ctcr.audit import sensor_pose
 from ctcr.errors import InputError
@@ -14,7 +13,7 @@ from ctcr.fit import joint
 from ctcr.fit.result import Fit
 from ctcr.fit.sessions import part_of_runs, some_runs
 from ctcr.model import parameters, user_recording
-from ctcr.model.noise import Noise, noise_of_readings, with_field
+from ctcr.model.noise import Noise, noise_of_readings
 from ctcr.model.sessions import told
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
@@ -97,9 +96,7 @@ def _field(positions: Array, chosen: Mask, noise: Noise) -> Array:
 
 def explains(fit: Fit, stated: Noise) -> bool:
     """Whether the noise as stated, with the likeliest part of its field error, explains what a fit leaves."""
-    parts = [with_field(stated, part) for part in settings.FIELD_PARTS]
-    fits = [joint.linear_fit(fit, noise=noise, weights=fit.weights) for noise in parts]
-    return not joint.rejects(max(fits, key=lambda tried: tried.log_evidence))
+    return not joint.rejects(joint.with_likeliest_field(fit, stated))
 
 
 def warnings(fit: Fit, explained: bool) -> list[str]:

@@ -24,7 +24,7 @@ from ctcr.fit.result import Fit, Priors, rms
 from ctcr.fit.widening import Likelihood, Scales
 from ctcr.frames import base_to_tracker
 from ctcr.model import recording, user_recording
-from ctcr.model.noise import Noise, noise_of_readings, with_field
+from ctcr.model.noise import Noise, has_field, noise_of_readings, with_field
 from ctcr.model.protocol import LinearModel, ResidualModel
 from ctcr.model.sessions import told
 from ctcr.model.table_poses import standard_tips
@@ -90,15 +90,15 @@ def fit(
         return user_recording.recording_of(robot, measurements, names, steps=steps)
 
     def fit_from(start: Array, like: Fit | None = None, starts: int = 1) -> Fit:
-        table, how = model(), options | {"start": start, "starts": starts}
+        table, how = model(), options | {"start": start, "starts": starts, "positions": at}
         if like:
             table.begin_at(like.model)
             how |= like.frozen
-        return fit_joint(table, priors, noise, at, rows, **how)
+        return fit_joint(table, priors, noise, rows=rows, **how)
 
     start, priors = _with_frame(model(), priors, noise, at, rows, **options)
     fitted = fit_from(start, starts=starts)
-    if positions is None and (noise.position_field or noise.rotation_field):
+    if positions is None and has_field(noise):
         at = fitted.predicted_positions()
         near = options | {"start": fitted.values, "first_weights": fitted.weights, "few_first": False}
         fitted = replace(fit_joint(fitted.model, priors, noise, at, rows, **near), starts=fitted.starts)
@@ -305,12 +305,12 @@ def rejects(fit: Fit) -> bool:
     return p_value(fit) < settings.SIGNIFICANCE
 
 
-def likeliest_field(fit: Fit, positions: Array | None = None) -> Noise:
-    """The noise of a fit with that part of its field error which makes the readings likeliest, by linearised fits; with
-    the sensor at other `positions` (M, 3) [m] where given."""
-    noises = (with_field(fit.noise, part) for part in settings.FIELD_PARTS)
-    fits = [linear_fit(fit, noise=noise, positions=positions, weights=fit.weights) for noise in noises]
-    return max(fits, key=lambda tried: tried.log_evidence).noise
+def with_likeliest_field(fit: Fit, stated: Noise | None = None, positions: Array | None = None) -> Fit:
+    """The linearised fit at its weights with that part of the stated field error which makes the readings likeliest.
+    Noise and `positions` (M, 3) [m] of the sensor are those of the fit where not given."""
+    noises = (with_field(stated or fit.noise, part) for part in settings.FIELD_PARTS)
+    fits = (linear_fit(fit, noise=noise, positions=positions, weights=fit.weights) for noise in noises)
+    return max(fits, key=lambda tried: tried.log_evidence)
 
 
 def tracker_error(fit: Fit, noise: Noise) -> tuple[float, float]:

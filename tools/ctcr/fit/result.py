@@ -156,9 +156,10 @@ class Fit:
         return np.where(np.isfinite(predicted), predicted, self.positions)
 
     @property
-    def frozen(self) -> dict[str, Array]:
-        """Options of fits that keep its weights, inflation and scales, so that their evidences can be compared."""
-        return {"weights": self.weights, "inflation": self.inflation, "scales": self.priors.scales}
+    def frozen(self) -> dict[str, Any]:
+        """Options of fits that keep its weights, inflation, scales and positions: their evidences can be compared."""
+        same = {"weights": self.weights, "inflation": self.inflation, "scales": self.priors.scales}
+        return same | {"positions": self.positions}
 
     def without_readings(self) -> "Fit":
         """Its values and statistics alone: small, however many rows there are. It has no residual."""

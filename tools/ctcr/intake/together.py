@@ -13,7 +13,7 @@ from ctcr.intake.mapping import MOVING
 from ctcr.intake.motion import Motion, complete, row_ranges
 from ctcr.show.wording import listed
 
-SAME_S = 1e-9  # times of two clocks that differ by less are one
+SAME_S = 1e-9  # [s] by which a count times its period may be off by rounding
 
 
 def divided(choices: Choices, poses: Log, joints: Log) -> tuple[Choices, Choices]:

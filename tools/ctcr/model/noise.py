@@ -39,6 +39,11 @@ def noise_of_readings(robot: Robot, measurements: Measurements, field: bool = Tr
     return noise_of(robot, field=field, kinds=kinds)
 
 
+def has_field(noise: Noise) -> bool:
+    """Whether it has a smooth error."""
+    return noise.position_field > 0 or noise.rotation_field > 0
+
+
 def with_field(noise: Noise, part: float) -> Noise:
     """The same jitter with a part of the smooth field error."""
     return changed(noise, position_field=part * noise.position_field, rotation_field=part * noise.rotation_field)

@@ -137,10 +137,10 @@ class EthercatSimulator(Simulator):
 
 
 def alone_on(interface: str) -> socket.socket:
-    """Held by the simulator that answers on an interface, whatever its folder: two would answer each frame twice."""
+    """A name that one simulator of an interface can hold, whatever its folder: two would answer each frame twice."""
     held = socket.socket(socket.AF_UNIX)
     try:
-        held.bind(f"\0ctcr sim ethercat {interface}")  # no file, but a name in the network that holds the interface
+        held.bind(f"\0ctcr sim ethercat {interface}")  # a name of the network namespace, no file
     except OSError:
         held.close()
         text = "another simulator answers there: end it, use another --interface, or `ctcr sim bench`"
