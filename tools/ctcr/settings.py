@@ -191,11 +191,8 @@ SMOOTH_SIZES = (2e-5, 5e-5, 1e-4, 2e-4, 5e-4)  # [m] standard deviations an axis
 # ---- Diagnosis: outliers
 
 SURPRISE = 3.0  # error over its expected size, from which a reading is an outlier
-MOST_OUTLIERS = 0.01  # fraction of outliers beyond which the model may be wrong and not the readings
-MANY_OUTLIERS = 0.1  # ... and beyond which it hardly can be right
+MANY_OUTLIERS = 0.1  # fraction of outliers beyond which the model is wrong and not the readings
 MOST_OF_A_RUN = 0.5  # fraction of outliers in a run from which it is the run that is unlike the others
-OUTLIERS_LEFT = 0.5  # outliers with effects over those without, above which the effects do not explain them
-HARDLY_EXPLAINED = 0.4  # fraction of the unexplained chi-square below which the first effect does not explain outliers
 MOST_ISOLATED = 0.03  # fraction of readings that may be isolated outliers: of more, the model is to blame
 SNAP_ERROR = 0.1  # fraction of an isolated outlier's error that another equilibrium leaves, where it is a snap
 SNAPS_LOOKED_AT = 300  # readings of a table, those of the largest errors, for which other equilibria are sought

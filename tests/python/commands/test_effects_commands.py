@@ -247,6 +247,7 @@ def test_faults_of_a_diagnosis(text, message, run, tmp_path):
         (["soften", "-o", "x.yaml"], "did you mean softening?", 1),
         (["softening", "-o", "x.yaml", "--set", "friction=0.1"], "not among the effects to add", 2),
         (["softening", "-o", "x.yaml", "--fit", "none.csv"], "no such file", 1),
+        (["softening", DEMO, "-o", "x.yaml"], "is a file and not an effect: --fit", 2),
         (["softening", "-o", "x.yaml", "--fit", "PLAN"], "no measured poses", 1),
         (["softening", "-o", "x.yaml", "--fit", DEMO, "--free", "tubes.9.length"], "no parameter is named", 2),
     ],

@@ -29,6 +29,8 @@ def command(robot, names, diagnosis, measurements, given, free, anyway, frame_pe
 
     Example: ctcr add robot.yaml friction --fit measurements.csv -o new.yaml
     """
+    from pathlib import Path
+
     from ctcr.api.add import add
     from ctcr.calibrate import outcome
     from ctcr.diagnose.add import write_values
@@ -36,6 +38,9 @@ def command(robot, names, diagnosis, measurements, given, free, anyway, frame_pe
     from ctcr.effects.settings import diagnosed, settings
     from ctcr.robot import robot_file
 
+    tables = [name for name in names if Path(name).is_file()]
+    if tables:
+        raise click.UsageError(f"{tables[0]} is a file and not an effect: --fit {tables[0]} fits the effects to it")
     loaded = robot_file.load(robot)
     target = outcome.check_target(loaded, target, in_place, needed=True)
     found, held, start = diagnosed(diagnosis, loaded) if diagnosis else ([], {}, {})

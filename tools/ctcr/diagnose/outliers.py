@@ -67,6 +67,13 @@ def messages(robot: Robot, measurements: Measurements, fit: Any, isolated: Mask)
     return said
 
 
+def hide_an_effect(measurements: Measurements, fit: Any) -> bool:
+    """Whether an effect that acts on few readings may have made the outliers of a fit: they agree with their
+    neighbours, or a tracker does not make so many."""
+    far = beyond_noise(fit)[np.isfinite(fit.residual[:, 0])]
+    return bool(np.mean(far) > settings.MANY_OUTLIERS or clustered(measurements, fit).any())
+
+
 def clustered(measurements: Measurements, fit: Any) -> Mask:
     """Fitted rows (M,) that are outliers like the reading nearest in joints and load: their errors point in the same
     direction, or are equal but for noise. None where the outliers of a tracker may agree so often by chance.

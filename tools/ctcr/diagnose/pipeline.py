@@ -17,7 +17,7 @@ from ctcr.diagnose.engine import Engine, Progress, values_of
 from ctcr.diagnose.explanations import probability
 from ctcr.diagnose.held_out import check_size, explained_by_run, fit_to_predict
 from ctcr.diagnose.residual import Residual, residual_of
-from ctcr.diagnose.round import Round, implausible_values, outlier_fraction, parameters_of
+from ctcr.diagnose.round import Round, implausible_values, parameters_of
 from ctcr.diagnose.selection import Accepted, select_effects
 from ctcr.diagnose.starts import rows_around
 from ctcr.diagnose.varying_coefficients import VaryingModel, varying_model
@@ -92,16 +92,6 @@ class Diagnosis(Result):
         rows += [[name, f"{size:.3f}"] for name, size in self.floors.rows()]
         notes = [*self.verdict.sentences, *map(sentence, self.notices)]
         return Glance(line, ["error on held-out readings", "mm RMS"], rows, notes, warnings=self.measurements.doubts)
-
-    @property
-    def mistakes_effect_for_outliers(self) -> bool:
-        """Whether more readings are outliers than a tracker makes, and effects do not explain why."""
-        before, after = outlier_fraction(self.rounds[0].before), outlier_fraction(self.final)
-        explained = self.accepted[0].explained if self.accepted else 0.0
-        others_fit = np.max(self.rounds[0].before.inflation) < settings.INFLATION_EXPLAINED
-        is_wrong = before > settings.MANY_OUTLIERS and np.max(self.final.inflation) > settings.INFLATION_WRONG
-        many = before > settings.MOST_OUTLIERS and after > max(settings.MOST_OUTLIERS, settings.OUTLIERS_LEFT * before)
-        return many and bool(explained < settings.HARDLY_EXPLAINED or others_fit or is_wrong)
 
     @property
     def in_doubt(self) -> list[str]:
@@ -202,12 +192,12 @@ def diagnose(
     robot, measurements, notices = prepared(robot, measurements)
     for turn in range(settings.TURNS):
         held_out = folds.held_out_rows(robot, measurements, turn)
-        result = _diagnose_robustly(robot, measurements, held_out, **options)
+        result = _diagnose(robot, measurements, held_out, **options)
         undetermined = _undetermined_groups(result)
         if undetermined:
             result.release_memory()
             held_out = folds.held_out_rows(robot, measurements, turn, undetermined)
-            again = _diagnose_robustly(robot, measurements, held_out, **options)
+            again = _diagnose(robot, measurements, held_out, **options)
             if again.accepted or not result.accepted:  # else the runs that showed the effect are now held out
                 result = again
         if result.accepted or not result.residual.structured:
@@ -218,20 +208,6 @@ def diagnose(
     result.notices += [*notices, *(wider.sentence for wider in result.widened)]
     result.seconds = perf_counter() - began
     return result
-
-
-def _diagnose_robustly(robot: Robot, measurements: Measurements, held_out: Mask, **options: Any) -> Diagnosis:
-    """With outliers down-weighted, and also without where an effect that acts on few readings may look like them."""
-    result = _diagnose(robot, measurements, held_out, robust=True, **options)
-    clusters = result.residual.clusters
-    if not result.mistakes_effect_for_outliers and not clusters:
-        return result
-    result.release_memory()
-    other = _diagnose(robot, measurements, held_out, robust=False, **options)
-    if clusters:
-        there = np.isin(measurements.row, clusters)
-        return min(result, other, key=lambda r: (outliers.outliers(r.with_effects).sum(), r.with_effects.rms_mm(there)))
-    return max(result, other, key=lambda r: r.final.log_evidence)
 
 
 def _with_effects(robot: Robot, fit: joint.Fit, accepted: list[Accepted], fixed: dict[str, float]) -> Robot:
@@ -257,11 +233,10 @@ def _undetermined_groups(result: Diagnosis) -> set[int]:
     return found
 
 
-def _diagnose(
-    robot: Robot, measurements: Measurements, held_out: Mask, robust: bool, progress: Progress, threads: int
-) -> Diagnosis:
+def _diagnose(robot: Robot, measurements: Measurements, held_out: Mask, progress: Progress, threads: int) -> Diagnosis:
     # Forward selection of effects on the fitted runs, each judged together with the calibration.
-    engine = Engine(robot, measurements, noise_of_readings(robot, measurements), ~held_out, robust, threads, progress)
+    noise = noise_of_readings(robot, measurements)
+    engine = Engine(robot, measurements, noise, ~held_out, threads=threads, progress=progress)
     pool, not_testable = candidates(robot, measurements)
     chosen = select_effects(engine, [c for c in pool if c.id not in robot.effects])
     accepted, fit = chosen.accepted, chosen.fit

@@ -145,12 +145,6 @@ class Judged:
         return float(removed / max(self.unexplained, removed, 1.0))
 
 
-def outlier_fraction(fit: joint.Fit) -> float:
-    """Of the fitted positions."""
-    used = fit.weights[:, 0] > 0
-    return float(np.mean(fit.weights[used, 0] < settings.OUTLIER_WEIGHT)) if used.any() else 0.0
-
-
 def parameters_of(fits: Collection[CandidateFit]) -> tuple[list[str], dict[str, float]]:
     """Names of all parameters of effects that are fitted, and the values at which others are held."""
     names = [name for one in fits for name in one.candidate.names]

@@ -7,6 +7,7 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Array
+from ctcr.diagnose import outliers
 from ctcr.diagnose.candidates import Candidate, forms, other_amplitudes
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.form_errors import log_odds_of_cause, log_odds_of_imitation
@@ -86,12 +87,7 @@ class Selection:
         """Accepts the next effect; whether there is one. Arguments as for grow()."""
         if self.finished:
             return False
-        taken = {identity for a in self.accepted for identity in a.ids}
-        round_ = self._round([c for c in pool if c.id not in taken], surely)
-        best = round_.accepted
-        if best and log_odds_of_imitation([one.explained for one in (*self.fits, best)]) > 0:
-            beside = "together with effects before it, " if self.accepted else ""
-            round_.reject(f"{beside}{best.id} more probably imitates a cause outside the catalogue")
+        round_ = self.decide_next(pool, surely)
         if more > 1 and not (round_.is_clear or round_.is_hopeless(more)):
             return False
         if round_.accepted and self._accept(round_):
@@ -115,6 +111,42 @@ class Selection:
                 self.grow(pool, more, surely)
         if len(seen) > 1:
             self.follow()
+
+    def decide_next(self, pool: list[Candidate], surely: bool = False) -> Round:
+        """The round for the next effect. It must not more probably imitate a cause outside the catalogue."""
+        taken = {identity for a in self.accepted for identity in a.ids}
+        round_ = self._round([c for c in pool if c.id not in taken], surely)
+        best = round_.accepted
+        if best and log_odds_of_imitation([one.explained for one in (*self.fits, best)]) > 0:
+            beside = "together with effects before it, " if self.accepted else ""
+            round_.reject(f"{beside}{best.id} more probably imitates a cause outside the catalogue")
+        return round_
+
+    def take_hidden(self, pool: list[Candidate]) -> bool:
+        """Accepts an effect that acts on few readings, which outliers are taken for, beside the others or in the place
+        of one; whether there is one."""
+        for open_place in (None, *self.accepted):
+            others = [a for a in self.accepted if a is not open_place]
+            there = replace(self, engine=replace(self.engine, robust=False), accepted=others, last=None)
+            there.history = [*self.history]
+            if there.finished:
+                continue
+            there.fit = there.calibrate(there.fits, values_of(self.fit))
+            round_ = there.decide_next(pool)
+            round_.anew = open_place.id if open_place else ""
+            there.engine = replace(self.engine)
+            accepted = round_.accepted and there._accept(round_)
+            if accepted and there.fit.log_evidence > self.fit.log_evidence + settings.DECISIVE:
+                self.engine, self.history, self.last = there.engine, there.history, None
+                self.accepted, self.fit = there.accepted, there.fit
+                return True
+        return False
+
+    def converged(self, engine: Engine) -> joint.Fit:
+        """The fit taken on to the tolerance of another engine, which then assumes the same initial history."""
+        engine.progress("calibration")
+        engine.measurements = self.engine.measurements
+        return engine.continued(self.fit, parameters_of(self.fits)[1])
 
     def _without_weakest(self) -> bool:
         """Drops the effect that is least probably a cause beside the others, if it is more probably none."""
@@ -208,8 +240,7 @@ class Selection:
         """Adds the effect of a round in its best form, if its gain lasts: in a converged fit that finds the outliers
         anew, the readings must be decisively likelier than before."""
         best, engine, before = round_.accepted, self.engine, self.fit
-        assumed = engine.robust, engine.measurements
-        engine.robust = True
+        assumed = engine.measurements
         one = Accepted(best, round_, best.refit, best.surely_explained)
         self.history.append(round_)
         self.accepted.append(one)
@@ -229,7 +260,7 @@ class Selection:
             self.history.pop()
             self.accepted.pop()
             self.fit = before
-            engine.robust, engine.measurements = assumed
+            engine.measurements = assumed
             round_.refute(gain)
             return False
         one.residual = self.fit.residual[:, :3]
@@ -271,16 +302,17 @@ class Selection:
 
     def _fit_forms(self, one: Accepted, tried: list[Candidate]) -> list[tuple[CandidateFit, joint.Fit]]:
         """Forms of an accepted effect, each fitted in the noise of the fit with the given form."""
-        found, fit = [], self.fit
+        found, fit, given = [], self.fit, one.best.candidate
         for form in tried:
             self.engine.progress(f"freeing the shape of {form.id}")
             best = replace(one.best, candidate=form)
             names, fixed = parameters_of(self._with(one, best))
             neutral = dict(zip(form.names, self.engine.priors(form.names)[0], strict=True))
-            start = neutral | one.round.rejected_variants | dict(form.shape) | values_of(fit)
+            own = dict(set(form.shape) - set(given.shape))  # values of another law are no start for this one
+            start = neutral | one.round.rejected_variants | dict(form.shape) | values_of(fit) | own
             there = self.engine.fit_like(fit, names, start, fixed=fixed, max_iterations=settings.FIRST_ITERATIONS)
-            if not there.converged and there.log_evidence > _least(fit):
-                there = self.engine.fit_like(fit, names, values_of(there), fixed=fixed)
+            if there.log_evidence > _least(fit):  # converged with a friction path of its own
+                there = self.engine.fit_like(fit, names, values_of(there), fixed=fixed, tolerance=settings.TOLERANCE)
             found.append((best, there))
         return found
 
@@ -304,19 +336,21 @@ def select_effects(engine: Engine, pool: list[Candidate]) -> Selection:
         coarse.measurements, chosen.engine = replace(coarse.measurements, from_home=from_home), coarse
     chosen.calibrated = chosen.fit = chosen.calibrate([], start_plain)
     if chosen.accepted:
-        coarse.robust = True
         chosen.fit = chosen.calibrate(chosen.fits, start)
         chosen.follow()
     if not chosen.finished:
         chosen.grow(pool)
     if few is None:
         chosen.revise(pool)
-    engine.progress("calibration")
-    engine.measurements, chosen.engine = coarse.measurements, engine
-    engine.robust = coarse.robust
-    chosen.fit = engine.continued(chosen.fit, parameters_of(chosen.fits)[1])
+    fit = chosen.converged(engine)
+    if outliers.hide_an_effect(engine.measurements, fit) and chosen.take_hidden(pool):
+        chosen.grow(pool)
+        if few is None:
+            chosen.revise(pool)
+        fit = chosen.converged(engine)
+    chosen.engine, chosen.fit = engine, fit
     if not chosen.accepted:
-        chosen.calibrated = chosen.fit
+        chosen.calibrated = fit
     return chosen
 
 
