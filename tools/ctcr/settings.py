@@ -191,13 +191,12 @@ SMOOTH_SIZES = (2e-5, 5e-5, 1e-4, 2e-4, 5e-4)  # [m] standard deviations an axis
 # ---- Diagnosis: outliers
 
 SURPRISE = 3.0  # error over its expected size, from which a reading is an outlier
-MANY_OUTLIERS = 0.1  # fraction of outliers beyond which the model is wrong and not the readings
+TRACKER_OUTLIERS = 0.03  # fraction of readings that are errors of the tracker, at most
+OUTLIER_SIGNIFICANCE = 1e-3  # p-value below which so many outliers, or outliers that agree, are no chance
 MOST_OF_A_RUN = 0.5  # fraction of outliers in a run from which it is the run that is unlike the others
-MOST_ISOLATED = 0.03  # fraction of readings that may be isolated outliers: of more, the model is to blame
 SNAP_ERROR = 0.1  # fraction of an isolated outlier's error that another equilibrium leaves, where it is a snap
 SNAPS_LOOKED_AT = 300  # readings of a table, those of the largest errors, for which other equilibria are sought
 CLUSTER_COSINE, CLUSTER_CHANCE = 0.5, 0.25  # between errors of neighbours that agree; how often it is that by chance
-CLUSTER_SIGNIFICANCE = 1e-3  # p-value below which outliers that agree with their neighbours are no chance
 CLUSTER_ROWS = 4  # outliers of a cluster that only agree in direction, at least
 
 # ---- Diagnosis: probabilities of explanations

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from ctcr import settings
-from ctcr.diagnose.outliers import clustered, isolated, outliers
+from ctcr.diagnose.outliers import are_many, clustered, isolated, outliers
 from ctcr.table.measurements import Measurements
 
 JITTER = 3e-5  # [m] per axis
@@ -91,9 +91,23 @@ def test_not_isolated(table):
     apart = replace(table, beta=table.beta[2 * again], alpha=table.alpha[2 * again])
     assert isolated(apart, fit(random, {30: error}), everywhere).sum() == 1
     assert not isolated(apart, fit(random, {30: error, 150: error}), everywhere).any()
-    few, many = np.arange(5, len(VISITS), 40), np.arange(5, len(VISITS), 20)
+    few, many = np.arange(5, len(VISITS), 40), np.arange(5, len(VISITS), 10)
     assert isolated(table, fit(random, dict.fromkeys(few, error)), everywhere).sum() == len(few)
     assert not isolated(table, fit(random, dict.fromkeys(many, error)), everywhere).any()
+
+
+@pytest.mark.parametrize("rows", [20, 240, 5000])
+def test_more_than_a_tracker_makes(rows):
+    """At the highest rate of a tracker, outliers are hardly ever called too many. Five times as many always are in a
+    long table, and sometimes in a short one."""
+    random = np.random.default_rng(rows)
+
+    def called(rate):
+        drawn = random.random((2000, rows, 1)) < rate
+        return np.mean([are_many(SimpleNamespace(weights=np.where(one, 1e-4, 1.0))) for one in drawn])
+
+    assert called(settings.TRACKER_OUTLIERS) < 5 * settings.OUTLIER_SIGNIFICANCE
+    assert called(5 * settings.TRACKER_OUTLIERS) > (0.1 if rows < 100 else 0.99)
 
 
 def test_wrong_model(table):

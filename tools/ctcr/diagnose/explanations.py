@@ -131,7 +131,7 @@ def _refitted(round_: Round) -> dict[str, CandidateFit]:
 def _noise(residual: Residual) -> float:
     """Log Bayes factor of noise over what is missing, at most: -e p log p. Ref: Sellke, Bayarri & Berger 2001,
     "Calibration of p values for testing precise null hypotheses"."""
-    p = min(max(residual.p_value, 1e-300), settings.CLUSTER_SIGNIFICANCE if residual.strays else 1.0)
+    p = min(max(residual.p_value, 1e-300), settings.OUTLIER_SIGNIFICANCE if residual.strays else 1.0)
     return math.log(-math.e * p * math.log(p)) if p < 1 / math.e else 0.0
 
 

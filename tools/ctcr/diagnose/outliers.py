@@ -27,7 +27,8 @@ def beyond_noise(fit: Any, *, rotation: bool = False) -> Mask:
 
 def isolated(measurements: Measurements, fit: Any, rows: Mask) -> Mask:
     """Outliers among `rows` (M,) whose neighbours, in time within the run and in joints and load, are none: errors of
-    the tracker, or snaps to another equilibrium that no other reading shows. None where there are many."""
+    the tracker, or snaps to another equilibrium that no other reading shows. None where a tracker does not make so
+    many."""
     read = np.flatnonzero(np.isfinite(fit.residual[:, :3]).all(axis=1))
     found = np.zeros(len(measurements), bool)
     if len(read) < 2:
@@ -38,7 +39,7 @@ def isolated(measurements: Measurements, fit: Any, rows: Mask) -> Mask:
     beside[1:] |= same & far[:-1]
     beside[:-1] |= same & far[1:]
     found[read] = rows[read] & far & ~beside & ~far[_nearest(measurements, read)]
-    return found if np.sum(found) <= settings.MOST_ISOLATED * np.sum(rows[read]) else np.zeros_like(found)
+    return np.zeros_like(found) if _beyond_a_tracker(np.sum(found), np.sum(rows[read])) else found
 
 
 def unexplained_runs(measurements: Measurements, fit: Any) -> list[int]:
@@ -67,11 +68,20 @@ def messages(robot: Robot, measurements: Measurements, fit: Any, isolated: Mask)
     return said
 
 
+def down_weighted(fit: Any) -> Mask:
+    """Fitted rows (M,) that count for little."""
+    return (fit.weights[:, 0] > 0) & (fit.weights[:, 0] < settings.OUTLIER_WEIGHT)
+
+
+def are_many(fit: Any) -> bool:
+    """Whether a tracker does not make so many outliers as a fit has down-weighted."""
+    return _beyond_a_tracker(np.sum(down_weighted(fit)), np.sum(fit.weights[:, 0] > 0))
+
+
 def hide_an_effect(measurements: Measurements, fit: Any) -> bool:
-    """Whether an effect that acts on few readings may have made the outliers of a fit: they agree with their
-    neighbours, or a tracker does not make so many."""
-    far = beyond_noise(fit)[np.isfinite(fit.residual[:, 0])]
-    return bool(np.mean(far) > settings.MANY_OUTLIERS or clustered(measurements, fit).any())
+    """Whether an effect that acts on few readings may have made the outliers of a fit: a tracker does not make so many,
+    or they agree with their neighbours."""
+    return are_many(fit) or bool(clustered(measurements, fit).any())
 
 
 def clustered(measurements: Measurements, fit: Any) -> Mask:
@@ -82,8 +92,7 @@ def clustered(measurements: Measurements, fit: Any) -> Mask:
     none.
     """
     fitted = fit.weights[:, 0] > 0
-    down_weighted = fitted & (fit.weights[:, 0] < settings.OUTLIER_WEIGHT)
-    far, error = down_weighted & outliers(fit, fit.inflation[0]), fit.residual[:, :3]
+    far, error = down_weighted(fit) & outliers(fit, fit.inflation[0]), fit.residual[:, :3]
     read = np.flatnonzero(fitted & np.isfinite(error).all(axis=1))
     found = np.zeros(len(measurements), bool)
     if not far[read].any() or len(read) < 2:
@@ -92,13 +101,15 @@ def clustered(measurements: Measurements, fit: Any) -> Mask:
     both, fraction = far[read] & far[neighbour], np.mean(far[read])
     size, size_there = (np.linalg.norm(error[rows], axis=1) for rows in (read, neighbour))
     alike = both & (np.sum(error[read] * error[neighbour], axis=1) > settings.CLUSTER_COSINE * size * size_there)
-    if np.sum(alike) >= settings.CLUSTER_ROWS and _beyond_chance(alike.sum(), far, settings.CLUSTER_CHANCE * fraction):
+    if np.sum(alike) >= settings.CLUSTER_ROWS and _beyond_chance(
+        alike.sum(), far.sum(), settings.CLUSTER_CHANCE * fraction
+    ):
         found[read] |= alike
     expected = fit.expected_square[:, 0]
     noise = settings.SURPRISE * fit.inflation[0] * np.sqrt(expected[read] + expected[neighbour])
     equal = both & (np.linalg.norm(error[read] - error[neighbour], axis=1) < noise)
     by_chance = np.mean((noise[far[read]] / size[far[read]]) ** 3)  # ratio of the volumes of two balls
-    if equal.any() and _beyond_chance((equal.sum() + 1) // 2, far, by_chance * fraction):  # two may be one pair
+    if equal.any() and _beyond_chance((equal.sum() + 1) // 2, far.sum(), by_chance * fraction):  # two may be one pair
         found[read] |= equal
     return found
 
@@ -110,6 +121,10 @@ def _nearest(measurements: Measurements, read: Integers) -> Integers:
     return np.where(near[:, 0] == np.arange(len(read)), near[:, 1], near[:, 0])
 
 
-def _beyond_chance(seen: int, far: Mask, chance: float) -> bool:
-    """Whether so many of the outliers that agree, each with this probability, are no chance."""
-    return bool(bdtrc(seen - 1, np.sum(far), min(chance, 1.0)) < settings.CLUSTER_SIGNIFICANCE)
+def _beyond_a_tracker(seen: int, of: int) -> bool:
+    return _beyond_chance(seen, of, settings.TRACKER_OUTLIERS)
+
+
+def _beyond_chance(seen: int, of: int, chance: float) -> bool:
+    """Whether so many of these, each with this probability, are no chance."""
+    return bool(bdtrc(seen - 1, of, min(chance, 1.0)) < settings.OUTLIER_SIGNIFICANCE)

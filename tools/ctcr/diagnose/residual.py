@@ -8,7 +8,7 @@ from ctcr import settings
 from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.sample import Sample, take_sample
 from ctcr.diagnose.engine import Engine
-from ctcr.diagnose.outliers import beyond_noise, clustered, unexplained_runs
+from ctcr.diagnose.outliers import are_many, clustered, down_weighted, unexplained_runs
 from ctcr.fit import joint
 from ctcr.model.table_poses import readings
 from ctcr.show.wording import listed, percent, runs_named
@@ -19,7 +19,7 @@ class Residual:
     p_value: float  # of the noise as stated, of all readings
     clusters: list[int]  # rows of the table that are outliers in the same direction as their neighbours
     runs: list[int]  # of which most readings are outliers, those that no fit saw too
-    outliers: float  # fraction of all readings
+    many_outliers: float  # fraction of the fitted readings that are outliers, if a tracker does not make so many
     before: Ranking  # of quantities on which the residual depends, before effects were added
     after: Ranking
     sample: Sample  # the readings that were ranked
@@ -37,7 +37,7 @@ class Residual:
     @property
     def strays(self) -> bool:
         """Whether there are outliers that a tracker does not make."""
-        return bool(self.clusters or self.runs) or self.outliers > settings.MANY_OUTLIERS
+        return bool(self.clusters or self.runs or self.many_outliers)
 
     @property
     def depends_on(self) -> list[str]:
@@ -48,8 +48,8 @@ class Residual:
         if self.runs:
             are = f"{runs_named(self.runs)} {'are' if len(self.runs) > 1 else 'is'}".capitalize()
             return [f"{are} unlike the others: most of the readings are outliers there. What was different?"]
-        if self.outliers > settings.MANY_OUTLIERS:
-            many = f"{percent(self.outliers)} of the readings are outliers, more than a tracker makes"
+        if self.many_outliers:
+            many = f"{percent(self.many_outliers)} of the readings are outliers, more than a tracker makes"
             return [f"{many}: does the robot snap, or is the sensor loose?"]
         if not self.clusters:
             return []
@@ -74,13 +74,13 @@ def residual_of(engine: Engine, before: joint.Fit, fit: joint.Fit, corrections: 
     ranked = _rank(engine, sample, before)
     after = ranked if fit is before else _rank(engine, sample, fit)
     clusters = engine.measurements.row[clustered(engine.measurements, fit)].tolist()
-    runs, far, every = [], 0.0, fit
+    many = float(down_weighted(fit).sum() / (fit.weights[:, 0] > 0).sum()) if are_many(fit) else 0.0
+    runs, every = [], fit
     if not corrections:  # else a held-out run has nuisance errors of its own, which no fit knows
         runs = unexplained_runs(engine.measurements, fit)
-        far = float(np.mean(beyond_noise(fit)[np.isfinite(fit.residual[:, 0])]))
         likeliest = joint.with_likeliest_field(joint.linear_fit(fit, noise=engine.noise))
         every = joint.linear_fit(fit, noise=likeliest.noise)  # held-out readings too
-    return Residual(joint.p_value(every), clusters, runs, far, ranked, after, sample, corrections)
+    return Residual(joint.p_value(every), clusters, runs, many, ranked, after, sample, corrections)
 
 
 def _rank(engine: Engine, sample: Sample, fit: joint.Fit) -> Ranking:

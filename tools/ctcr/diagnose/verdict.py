@@ -93,6 +93,7 @@ def judge(rounds: list[Round], accepted: list[Accepted], residual: Residual, exp
         usual = 1 - (2 * form_error(accepted)) ** 2
         odd = [run for run, share in explained.items() if share < usual]
         sentences += [f"More than noise is left{f', most of it in {listed(odd)}' if odd else ''}."]
+    sentences += residual.about_outliers
     if any(len(ids) > 1 for ids in classes):
         return Verdict("ambiguous", present, every, ["These data cannot tell some effects apart.", *sentences])
     word = "identified" if alone >= settings.SURE else "probable"
