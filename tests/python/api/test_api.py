@@ -96,7 +96,7 @@ def test_same_as_commands(command, file, report, fit, found, better, tmp_path):
     given = ["--diagnosis", kept, "--fit", file, "--free", FEW, "-o", new]
     assert command("add", robot, *given) == numbers(better)
     assert robot_file.load(new).model_dump() == better.robot.model_dump()
-    assert list(better.robot.effects) == better.ids == [found.accepted[0].id]
+    assert list(better.robot.effects) == better.ids == [one.id for one in found.accepted]
 
 
 def test_same_report(run, file, report, tmp_path):
