@@ -303,14 +303,17 @@ class Selection:
     def _fit_forms(self, one: Accepted, tried: list[Candidate]) -> list[tuple[CandidateFit, joint.Fit]]:
         """Forms of an accepted effect, each fitted in the noise of the fit with the given form."""
         found, fit, given = [], self.fit, one.best.candidate
+        quick = {"max_iterations": settings.FIRST_ITERATIONS}
         for form in tried:
             self.engine.progress(f"freeing the shape of {form.id}")
             best = replace(one.best, candidate=form)
             names, fixed = parameters_of(self._with(one, best))
             neutral = dict(zip(form.names, self.engine.priors(form.names)[0], strict=True))
-            own = dict(set(form.shape) - set(given.shape))  # values of another law are no start for this one
-            start = neutral | one.round.rejected_variants | dict(form.shape) | values_of(fit) | own
-            there = self.engine.fit_like(fit, names, start, fixed=fixed, max_iterations=settings.FIRST_ITERATIONS)
+            known = neutral | one.round.rejected_variants | dict(form.shape) | values_of(fit)
+            own = dict(set(form.shape) - set(given.shape))  # values of another law may be a bad start for this one
+            starts = [known, known | own] if own.keys() & set(names) else [known | own]
+            few = [self.engine.fit_like(fit, names, start, fixed=fixed, **quick) for start in starts]
+            there = max(few, key=lambda tried: tried.log_evidence)
             if there.log_evidence > _least(fit):  # converged with a friction path of its own
                 there = self.engine.fit_like(fit, names, values_of(there), fixed=fixed, tolerance=settings.TOLERANCE)
             found.append((best, there))
