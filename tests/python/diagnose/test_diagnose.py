@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from ctcr.diagnose import add, diagnose
 from ctcr.diagnose.linearised import Linear
+from ctcr.diagnose.outliers import down_weighted
 from ctcr.diagnose.pipeline import _undetermined_groups
 from ctcr.effects import catalogue
 from ctcr.fit.folds import groups
@@ -130,6 +131,7 @@ def test_contact_of_few_readings(robot, play):
     assert found[-1] == {"contact"} and len(found) == (2 if play else 1)
     assert not play or "backlash_rotation" in found[0]
     assert not result.residual.strays
+    assert down_weighted(result.final).sum() <= 0.01 * (result.final.weights[:, 0] > 0).sum()
     floor, seen = result.rms_mm["noise_floor"], ~result.held_out
     assert result.final.rms_mm(seen) < 1.1 * floor < 2 * floor < result.calibrated.rms_mm(seen)
 

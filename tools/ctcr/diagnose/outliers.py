@@ -101,9 +101,8 @@ def clustered(measurements: Measurements, fit: Any) -> Mask:
     both, fraction = far[read] & far[neighbour], np.mean(far[read])
     size, size_there = (np.linalg.norm(error[rows], axis=1) for rows in (read, neighbour))
     alike = both & (np.sum(error[read] * error[neighbour], axis=1) > settings.CLUSTER_COSINE * size * size_there)
-    if np.sum(alike) >= settings.CLUSTER_ROWS and _beyond_chance(
-        alike.sum(), far.sum(), settings.CLUSTER_CHANCE * fraction
-    ):
+    in_direction = settings.CLUSTER_CHANCE * fraction
+    if np.sum(alike) >= settings.CLUSTER_ROWS and _beyond_chance(alike.sum(), far.sum(), in_direction):
         found[read] |= alike
     expected = fit.expected_square[:, 0]
     noise = settings.SURPRISE * fit.inflation[0] * np.sqrt(expected[read] + expected[neighbour])

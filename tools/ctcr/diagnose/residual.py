@@ -87,7 +87,6 @@ def _rank(engine: Engine, sample: Sample, fit: joint.Fit) -> Ranking:
     """The quantities on which the position residual depends, without field error and outliers."""
     rows = np.searchsorted(engine.measurements.row, sample.row)
     left = (fit.residual - fit.field)[rows, :3]
-    weight = fit.weights[rows, 0]
-    left[~np.isfinite(left).all(axis=1) | ((weight > 0) & (weight < settings.OUTLIER_WEIGHT))] = 0.0
+    left[~np.isfinite(left).all(axis=1) | down_weighted(fit)[rows]] = 0.0
     error = left @ sample.rotation
     return rank(sample, error - error.mean(axis=0), settings.SIGNIFICANCE)

@@ -123,8 +123,8 @@ class Selection:
         return round_
 
     def take_hidden(self, pool: list[Candidate]) -> bool:
-        """Accepts an effect that acts on few readings, which outliers are taken for, beside the others or in the place
-        of one; whether there is one."""
+        """Accepts an effect that acts on few readings, beside the others or in the place of one; whether there is one.
+        In a fit with weights such readings look like outliers, so here all readings count alike."""
         for open_place in (None, *self.accepted):
             others = [a for a in self.accepted if a is not open_place]
             there = replace(self, engine=replace(self.engine, robust=False), accepted=others, last=None)
@@ -312,8 +312,8 @@ class Selection:
             known = neutral | one.round.rejected_variants | dict(form.shape) | values_of(fit)
             own = dict(set(form.shape) - set(given.shape))  # values of another law may be a bad start for this one
             starts = [known, known | own] if own.keys() & set(names) else [known | own]
-            few = [self.engine.fit_like(fit, names, start, fixed=fixed, **quick) for start in starts]
-            there = max(few, key=lambda tried: tried.log_evidence)
+            begun = [self.engine.fit_like(fit, names, start, fixed=fixed, **quick) for start in starts]
+            there = max(begun, key=lambda end: end.log_evidence)
             if there.log_evidence > _least(fit):  # converged with a friction path of its own
                 there = self.engine.fit_like(fit, names, values_of(there), fixed=fixed, tolerance=settings.TOLERANCE)
             found.append((best, there))
